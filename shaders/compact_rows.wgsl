@@ -19,7 +19,7 @@ struct RowEntries {
 }
 
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
-@group(1) @binding(4) var<storage, read_write> found: RowEntries;
+@group(1) @binding(4) var<storage, read_write> list: RowEntries;
 
 var<workgroup> ends: array<u32, COMPACT_LANES>;   // cumulative counts of lanes
 var<workgroup> first: u32;
@@ -46,12 +46,12 @@ fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
     let run = (settings.slots + COMPACT_LANES - 1u) / COMPACT_LANES;
     let start = min(lane * run, settings.slots);
     let end = min(start + run, settings.slots);
-    var met = 0u;
+    var count = 0u;
     for (var slot = start; slot < end; slot++) {
-        met += u32(counts[row + slot] != 0u);
+        count += u32(counts[row + slot] != 0u);
     }
     // Prefix sums over the lanes (Hillis and Steele 1986).
-    ends[lane] = met;
+    ends[lane] = count;
     for (var step = 1u; step < COMPACT_LANES; step *= 2u) {
         workgroupBarrier();
         var before = 0u;
@@ -63,10 +63,10 @@ fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
     }
     workgroupBarrier();
     if lane == 0u {
-        first = atomicAdd(&found.count, ends[COMPACT_LANES - 1u]);
+        first = atomicAdd(&list.count, ends[COMPACT_LANES - 1u]);
     }
     workgroupBarrier();
-    var place = first + ends[lane] - met;
+    var index = first + ends[lane] - count;
     for (var slot = start; slot < end; slot++) {
         let at = row + slot;
         let count = counts[at];
@@ -82,9 +82,9 @@ fn compact(patch_: u32, row: u32, lane: u32, has_panes: bool) {
                 counts[passed] = 0u;
             }
         }
-        if place < settings.entries {
-            found.entries[place] = entry;
+        if index < settings.entries {
+            list.entries[index] = entry;
         }
-        place += 1u;
+        index += 1u;
     }
 }

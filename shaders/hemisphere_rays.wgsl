@@ -30,21 +30,21 @@ fn cast_rays(p: u32, lane: u32) {
     for (var k = 0u; k < 2u * light_count; k++) {
         light_sums[k] = Visible();
     }
-    var found = array<RaySums, 2>();
+    var sums = array<RaySums, 2>();
     for (var k = rays.start + lane; k < rays.stop; k += LANES) {
         let half = select(0u, 1u, k >= rays.middle);
-        cast_ray(p, point, direction_of(k, point), light_count, half, &found);
+        cast_ray(p, point, direction_of(k, point), light_count, half, &sums);
     }
     if rays.start >= rays.end {
         return;
     }
     for (var half = 0u; half < 2u; half++) {
-        let light = added_up(lane, vec4f(found[half].light, found[half].escaped));
-        let emitted = added_up(lane, vec4f(found[half].lamps, found[half].back));
-        let near = added_up(lane, vec4f(found[half].near_light, found[half].near));
-        let rest = added_up(lane, vec4f(found[half].inverse_distance, 0.0, 0.0, 0.0));
-        let largest = largest_of(lane, found[half].largest);
-        let near_largest = largest_of(lane, found[half].near_largest);
+        let light = added_up(lane, vec4f(sums[half].light, sums[half].escaped));
+        let emitted = added_up(lane, vec4f(sums[half].lamps, sums[half].back));
+        let near = added_up(lane, vec4f(sums[half].near_light, sums[half].near));
+        let rest = added_up(lane, vec4f(sums[half].inverse_distance, 0.0, 0.0, 0.0));
+        let largest = largest_of(lane, sums[half].largest);
+        let near_largest = largest_of(lane, sums[half].near_largest);
         if lane == 0u {
             states[p].rays[half].light += light.xyz;
             states[p].rays[half].escaped += light.w;
@@ -75,7 +75,7 @@ fn cast_ray(
     direction: vec3f,
     light_count: u32,
     half: u32,
-    found: ptr<function, array<RaySums, 2>>,
+    sums: ptr<function, array<RaySums, 2>>,
 ) {
     let ray = Ray(point.position, point.position_low, direction, point.near);
     let hit = nearest(ray);
@@ -88,47 +88,47 @@ fn cast_ray(
     var is_known = false;
     for (var k = 0u; k < light_count; k++) {
         let ranked = states[p].lights[k];
-        let is_met = ranked.light == of_light;
-        is_known |= is_met;
+        let is_hit = ranked.light == of_light;
+        is_known |= is_hit;
         if ranked.is_wide != 0u {
             let at = half * light_count + k;
-            if is_met {
+            if is_hit {
                 light_sums[at].seen += share;
             }
-            light_sums[at].all += f32(is_met || is_towards(ray, lights[ranked.light]));
+            light_sums[at].all += f32(is_hit || is_towards(ray, lights[ranked.light]));
         }
     }
     if !is_surface {
         let light = from_sky(direction) * share;
-        (*found)[half].escaped += 1.0;
-        (*found)[half].light += light;
-        (*found)[half].largest = max((*found)[half].largest, length(light));
+        (*sums)[half].escaped += 1.0;
+        (*sums)[half].light += light;
+        (*sums)[half].largest = max((*sums)[half].largest, length(light));
         return;
     }
-    (*found)[half].inverse_distance += 1.0 / hit.distance;
+    (*sums)[half].inverse_distance += 1.0 / hit.distance;
     if !hit.front {
-        (*found)[half].back += 1.0;
+        (*sums)[half].back += 1.0;
         return;
     }
     let there = field_at(triangles[hit.triangle].index, vec2f(hit.u, hit.v));
     let light = there.radiosity * share;
     if settings.near_field != 0u && is_near(hit, there.side) {
-        (*found)[half].near += 1.0;
-        (*found)[half].near_light += light;
-        (*found)[half].near_largest = max((*found)[half].near_largest, length(light));
+        (*sums)[half].near += 1.0;
+        (*sums)[half].near_light += light;
+        (*sums)[half].near_largest = max((*sums)[half].near_largest, length(light));
     } else {
-        (*found)[half].light += light;
-        (*found)[half].largest = max((*found)[half].largest, length(light));
+        (*sums)[half].light += light;
+        (*sums)[half].largest = max((*sums)[half].largest, length(light));
     }
     if of_light != NO_LIGHT && !is_known {
-        (*found)[half].lamps += lights[of_light].exitance * share;
+        (*sums)[half].lamps += lights[of_light].exitance * share;
     }
 }
 
 // Whether a light, occluded or not, lies along the ray.
 fn is_towards(ray: Ray, light: TracedLight) -> bool {
     for (var k = light.first; k < light.first + light.count; k++) {
-        let hit = meet(lamps[k].triangle, ray, FAR, 1.0);
+        let hit = intersect(lamps[k].triangle, ray, FAR, 1.0);
         if hit.triangle != NOTHING && hit.front {
             return true;
         }

@@ -2,8 +2,6 @@
 // (the clear value) for nothing, BACK, or a cell of the triangle's lattice, computed from the
 // barycentric position. Needs shared/corner.wgsl and shared/lattice.wgsl before it.
 
-const BACK: u32 = 1u;
-
 struct FaceView {
     eye: vec3f,           // patch centre, relative to the middle of the scene, in units of its size
     near: f32,            // near plane, same unit
@@ -44,7 +42,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) view_index
     var out: Varying;
     out.position = clip_position(x, y, w, view.bottom, view.near);
     if triangle == view.own_triangle || shows_covered_back(index, view.eye, view.eye_low) {
-        out.position = NOWHERE;
+        out.position = vec4f(0.0, 0.0, -1.0, 1.0);   // beyond the far end: not drawn
     }
     let grid = triangles[triangle];
     out.lattice = lattice_corner(index % 3u, grid.side);

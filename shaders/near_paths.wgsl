@@ -3,18 +3,9 @@
 // shared/lights.wgsl, shared/sky.wgsl, shared/gather_state.wgsl, shared/hemisphere.wgsl,
 // shared/near_field.wgsl, shared/lattice.wgsl and shared/field.wgsl before it.
 //
-// At every vertex of a path light is found twice: at a point of a light and of the sun, and where
+// At every vertex of a path light is sampled twice: at a point of a light and of the sun, and where
 // the path goes on. A light counts with its share of both densities (balance heuristic: Veach and
 // Guibas 1995). The path ends at the first surface that is not near, in the field's light.
-
-// Vertices of a path at most: of those that are left a share of the light below albedo^128 ends in
-// the field's light although the surface is near.
-const MAX_VERTICES: u32 = 128u;
-// Paths go on with this probability at most.
-const MAX_SURVIVAL: f32 = 0.999;
-// Height of a vertex above its triangle, in units of the scene's size: some four times the rounding
-// of coordinates in the triangle test, half of which a ray may have from there.
-const LIFT: f32 = 9.5367432e-7;
 
 var<private> random_state: u32;
 
@@ -70,17 +61,17 @@ fn follow_paths(p: u32, lane: u32) {
     for (var k = rays.start + lane; k < rays.stop; k += LANES) {
         let half = select(0u, 1u, k >= rays.middle);
         if covered[half] {
-            let found = near_light(p, point, k);
-            light[half] += found;
-            largest[half] = max(largest[half], length(found));
+            let reflected = near_light(p, point, k);
+            light[half] += reflected;
+            largest[half] = max(largest[half], length(reflected));
         }
     }
     for (var half = 0u; half < 2u; half++) {
         let all = added_up(lane, vec4f(light[half], 0.0));
-        let most = largest_of(lane, largest[half]);
+        let max_length = largest_of(lane, largest[half]);
         if lane == 0u {
             states[p].rays[half].light += all.xyz;
-            states[p].rays[half].largest = max(states[p].rays[half].largest, most);
+            states[p].rays[half].largest = max(states[p].rays[half].largest, max_length);
         }
     }
 }
@@ -102,7 +93,7 @@ fn near_light(p: u32, point: TracedPoint, k: u32) -> vec3f {
 
 // Radiosity that a front with this reflectance reflects at a hit, without its emission.
 fn light_by_path(p: u32, start: Hit, start_reflectance: vec3f) -> vec3f {
-    var found = vec3f(0.0);
+    var sum = vec3f(0.0);
     var throughput = vec3f(1.0);
     var hit = start;
     var reflectance = start_reflectance;
@@ -113,7 +104,7 @@ fn light_by_path(p: u32, start: Hit, start_reflectance: vec3f) -> vec3f {
             let albedo = reflectance + through;
             let survival = min(max(albedo.x, max(albedo.y, albedo.z)), MAX_SURVIVAL);
             if random() >= survival {
-                return found;
+                return sum;
             }
             throughput /= survival;
         }
@@ -133,9 +124,9 @@ fn light_by_path(p: u32, start: Hit, start_reflectance: vec3f) -> vec3f {
         }
         throughput *= leaves;
         let at = on_triangle(t, hit.u, hit.v, side);
-        found += throughput * irradiance_of_lights(p, at);
+        sum += throughput * irradiance_of_lights(p, at);
         if scene.has_sun != 0u {
-            found += throughput * irradiance_of_sun(at);
+            sum += throughput * irradiance_of_sun(at);
         }
         let square = random();
         let turn = random();
@@ -143,27 +134,27 @@ fn light_by_path(p: u32, start: Hit, start_reflectance: vec3f) -> vec3f {
         let ray = Ray(at.position, at.position_low, direction, at.near);
         hit = nearest_but(ray, t.index);
         if hit.triangle == NOTHING {
-            return found + throughput * passed(ray, FAR) * from_sky(direction);
+            return sum + throughput * passed(ray, FAR) * from_sky(direction);
         }
         if !hit.front {
-            return found;
+            return sum;
         }
         throughput *= passed(ray, hit.distance);
-        let met = triangles[hit.triangle];
-        if met.light != NO_LIGHT {
-            let light = lights[met.light];
-            let facing = max(-dot(normal_of(met), direction), 0.0);
+        let next = triangles[hit.triangle];
+        if next.light != NO_LIGHT {
+            let light = lights[next.light];
+            let facing = max(-dot(normal_of(next), direction), 0.0);
             let above = max(dot(at.normal, direction), 0.0);
             let factor = light.area * facing * above / (PI * hit.distance * hit.distance);
-            found += throughput * light.exitance * balance(factor, chance_of(p, met.light));
+            sum += throughput * light.exitance * balance(factor, chance_of(p, next.light));
         }
-        let there = field_at(met.index, vec2f(hit.u, hit.v));
+        let there = field_at(next.index, vec2f(hit.u, hit.v));
         if vertex == MAX_VERTICES || !is_near(hit, there.side) {
-            return found + throughput * there.radiosity;
+            return sum + throughput * there.radiosity;
         }
         reflectance = there.reflectance;
     }
-    return found;
+    return sum;
 }
 
 // What of the light that arrives at a triangle leaves its other side, where its front reflects this

@@ -1,12 +1,6 @@
 // Selects the lights that are sampled separately from each point, by closed form: a workgroup per
 // point. Needs shared/trace.wgsl, shared/lights.wgsl and shared/gather_state.wgsl before it.
 
-// Lights below this share of the total unoccluded irradiance are not sampled separately.
-const MIN_IRRADIANCE_SHARE: f32 = 1e-3;
-// Number of points for the evenness of a light; minimum expected number of rays that hit a light.
-const EVENNESS_POINTS: u32 = 32u;
-const LEAST_RAYS: f32 = 8.0;
-
 var<workgroup> factors: array<f32, LANES>;
 var<workgroup> ranked: array<RankedLight, MAX_EXPLICIT_LIGHTS>;
 var<workgroup> ranked_irradiance: array<f32, MAX_EXPLICIT_LIGHTS>;
@@ -109,7 +103,7 @@ fn rank_lights(
         if lane == 0u {
             let worth = sum.x * sum.x / max(sum.y * f32(EVENNESS_POINTS), 1e-37);
             let factor = ranked[k].factor;
-            let has_rays = f32(settings.min_rays) * factor >= LEAST_RAYS;
+            let has_rays = f32(settings.min_rays) * factor >= MIN_RAYS;
             let is_wide = has_rays && factor * f32(RAYS_PER_SHADOW_RAY) > worth;
             ranked[k].is_wide = u32(is_wide);
         }

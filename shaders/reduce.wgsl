@@ -4,8 +4,6 @@
 // A thread processes one pixel column of a strip, and looks the element up and adds to memory only
 // where the item changes.
 
-const STRIP: u32 = 16u;
-
 struct Reduction {
     resolution: u32,      // N: an item buffer is N wide and 3N high
     slots: u32,           // words of a row: open, back, then one per element

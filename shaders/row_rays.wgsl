@@ -5,10 +5,6 @@
 // Slots of a row: open, back, then the elements. With panes three more rows of a patch add up their
 // transmittances, per channel in units of 1/RowSettings::unit.
 
-const OPEN: u32 = 0u;
-const BACK: u32 = 1u;
-const FIRST_ELEMENT: u32 = 2u;
-
 struct TracedPatch {
     position: vec3f,
     near: f32,
@@ -29,7 +25,7 @@ fn row_rays(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let patch_ = patches[id.y];
-    let local = textureLoad(directions, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0).xyz;
+    let local = textureLoad(directions, vec2u(k % TEXELS_PER_LINE, k / TEXELS_PER_LINE), 0).xyz;
     let direction = turned(local, patch_.normal, patch_.rotation);
     let ray = Ray(patch_.position, patch_.position_low, direction, patch_.near);
     let hit = nearest_but(ray, patch_.own_triangle);
@@ -38,7 +34,7 @@ fn row_rays(@builtin(global_invocation_id) id: vec3u) {
         slot = BACK;
         if hit.front {
             let at = element_at(triangles[hit.triangle].index, vec2f(hit.u, hit.v));
-            slot = FIRST_ELEMENT + at.element;
+            slot = FIRST_FRONT + at.element;
         }
     }
     if scene.panes == NOTHING {

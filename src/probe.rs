@@ -23,7 +23,6 @@ use glam::DVec3;
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, IrradianceSample};
 use crate::progress::BatchSizer;
-use crate::scene::Scene;
 use crate::visibility::{buried, offset};
 use harmonics::DIRECTIONS;
 pub use harmonics::Harmonics;
@@ -97,7 +96,7 @@ pub fn probes_at(
 ) -> Result<Option<Vec<Probe>>, Error> {
     check(positions, size)?;
     let field = light.radiosity_field();
-    let near = (offset::SURFACE_LIFT * size).max(least_lift(light.mesh.scene()));
+    let near = (offset::SURFACE_LIFT * size).max(offset::min_lift(light.mesh.scene()));
     let near = near * offset::NEAR_OF_LIFT;
     let mut probes = Vec::with_capacity(positions.len());
     let mut remaining = positions;
@@ -118,10 +117,6 @@ pub fn probes_at(
         }
     }
     Ok(Some(probes))
-}
-
-fn least_lift(scene: &Scene) -> f64 {
-    offset::MIN_LIFT_ULPS * scene.coordinate_ulp()
 }
 
 fn check(positions: &[DVec3], size: f64) -> Result<(), Error> {

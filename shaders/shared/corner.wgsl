@@ -26,9 +26,6 @@ fn shows_covered_back(index: u32, eye: vec3f, eye_low: vec3f) -> bool {
     return dot(a, cross(b - a, c - a)) >= 0.0;
 }
 
-// Position of vertices that are not drawn: beyond the far end.
-const NOWHERE: vec4f = vec4f(0.0, 0.0, -1.0, 1.0);
-
 // Clip coordinates of a point with view coordinates x, y and w (along the view's axis). Lines from
 // tangent `bottom` to 1 fill the viewport; depth near/w is reversed, its far end infinite.
 fn clip_position(x: f32, y: f32, w: f32, bottom: f32, near: f32) -> vec4f {

@@ -1,7 +1,5 @@
 // The element at a position of a triangle. Needs shared/lattice.wgsl before it.
 
-const INNER: u32 = 0x80000000u;
-
 // Per triangle of the scene its first node and the number of cells along an edge, a power of two;
 // then the nodes of all quadtrees: INNER + first child, or an element.
 @group(2) @binding(0) var<storage, read> quadtrees: array<u32>;

@@ -1,7 +1,5 @@
 // The radiosity that surfaces reflect, and their reflectance. Needs shared/element.wgsl before it.
 
-const ELEMENTS_A_LINE: u32 = 2048u;   // of their texture
-
 // Reflected radiosity at corners; with the element's reflectance, a channel at each of them.
 @group(2) @binding(1) var elements: texture_2d<f32>;
 
@@ -15,7 +13,7 @@ struct OnElement {
 // between the corners of the element, which are in three lines.
 fn field_at(triangle: u32, weights: vec2f) -> OnElement {
     let at = element_at(triangle, weights);
-    let at_a = vec2u(at.element % ELEMENTS_A_LINE, at.element / ELEMENTS_A_LINE * 3u);
+    let at_a = vec2u(at.element % TEXELS_PER_LINE, at.element / TEXELS_PER_LINE * 3u);
     let a = textureLoad(elements, at_a, 0);
     let b = textureLoad(elements, at_a + vec2u(0u, 1u), 0);
     let c = textureLoad(elements, at_a + vec2u(0u, 2u), 0);

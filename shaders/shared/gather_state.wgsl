@@ -3,7 +3,6 @@
 // rank_lights ─► hemisphere_rays, near_paths, light_rays ─► settle ─► those again, of points that
 //                                                                     need more
 
-const LANES: u32 = 64u;               // size of a workgroup; each serves one point
 const RAYS_PER_SHADOW_RAY: u32 = 4u;
 
 // Sums over rays.

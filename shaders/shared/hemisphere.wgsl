@@ -6,7 +6,7 @@
 
 // The direction of ray k.
 fn direction_of(k: u32, point: TracedPoint) -> vec3f {
-    let local = textureLoad(directions, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0).xyz;
+    let local = textureLoad(directions, vec2u(k % TEXELS_PER_LINE, k / TEXELS_PER_LINE), 0).xyz;
     return turned(local, point.normal, point.rotation);
 }
 

@@ -2,7 +2,6 @@
 
 const MAX_EXPLICIT_LIGHTS: u32 = 8u;
 const NO_LIGHT: u32 = 0xffffffffu;
-const ANY_LIGHT: u32 = 0xfffffffeu;   // of no triangle: any hit hides the sun
 const PI: f32 = 3.14159265;
 
 struct TracedLight {
@@ -50,7 +49,7 @@ fn passed(ray: Ray, end: f32) -> vec3f {
         let first = node & 0x1fffffffu;
         let last = first + ((node >> 29u) & 3u);
         for (var k = first; k <= last; k++) {
-            let hit = meet(k, ray, end, 0.0);
+            let hit = intersect(k, ray, end, 0.0);
             if hit.triangle != NOTHING && hit.distance + hit.off < end {
                 share *= lights[triangles[k].light].exitance;
             }

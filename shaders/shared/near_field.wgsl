@@ -2,8 +2,6 @@
 // the hemisphere of a point, paths find the light that they reflect. Needs shared/trace.wgsl before
 // it.
 
-const MIN_COVERED: f32 = 0.5;         // share of the hemisphere above which paths find the light
-
 // Whether a hit is nearer than its element is wide, of which there are `side` along an edge of the
 // triangle.
 fn is_near(hit: Hit, side: u32) -> bool {

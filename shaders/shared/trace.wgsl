@@ -3,20 +3,10 @@
 // two parts each: see shared/corner.wgsl. Boxes are wider than their contents by more than
 // rounding.
 
-const NOTHING: u32 = 0xffffffffu;
-const LEAF: u32 = 0x80000000u;        // a leaf: this, its triangles less one << 29, the first one
-const FAR: f32 = 1e30;
 const TURN: f32 = 6.2831853;
 const STACK: u32 = 33u;               // levels of the hierarchy, plus two
-// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
-const ROUNDING: f32 = 5e-7;
 
-const BACK_IS_COVERED: u32 = 1u;      // flags of a triangle: rays do not hit its back
-const HAS_HOLES: u32 = 2u;            // a mask defines its solid part
-// From this bit on: 1 plus the row of its material's transmittance, if light leaves its other side.
-const ROW_OF_FLAGS: u32 = 2u;
-
-struct Node {
+struct TraceNode {
     low_a: vec3f,         // the first child's box
     child_a: u32,         // a node, or a leaf
     high_a: vec3f,
@@ -38,7 +28,7 @@ struct TracedTriangle {
     extent: f32,          // maximum edge length
 }
 
-struct TracedScene {
+struct TracedSceneInfo {
     panes: u32,           // root of the hierarchy of clear panes, or NOTHING
     lights: u32,          // number of lights
     sky_side: u32,        // pieces of the sky along the edge of a square; 0 if it is uniform
@@ -61,16 +51,14 @@ struct TracedScene {
     padding_8: u32,
 }
 
-@group(0) @binding(0) var<storage, read> nodes: array<Node>;
+@group(0) @binding(0) var<storage, read> nodes: array<TraceNode>;
 @group(0) @binding(1) var<storage, read> triangles: array<TracedTriangle>;
-@group(0) @binding(2) var<uniform> scene: TracedScene;
+@group(0) @binding(2) var<uniform> scene: TracedSceneInfo;
 // Per triangle with holes three texels: texture coordinates, in texels of the mask, of its first
 // and second corner; those of the third, and the mask's first word and width; its height, and
 // whether it ends at its border instead of being repeated.
-@group(0) @binding(3) var mask_places: texture_2d<f32>;
+@group(0) @binding(3) var mask_coordinates: texture_2d<f32>;
 @group(0) @binding(4) var masks: texture_2d<u32>;   // a bit per texel, 32 per word: 1 where solid
-
-const TEXELS_A_LINE: u32 = 2048u;     // of textures that are read as arrays
 
 struct Ray {
     origin: vec3f,
@@ -92,7 +80,7 @@ var<private> stack: array<u32, STACK>;
 
 // The hit of triangle k, at most as far as `end`; `slack` scales a margin for rounding, so that no
 // ray passes through a side that two triangles share.
-fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
+fn intersect(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
     let t = triangles[k];
     let s = (ray.origin - t.corner) + (ray.origin_low - t.corner_low);
     let p = cross(ray.direction, t.edge_v);
@@ -105,12 +93,12 @@ fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
     let off = ROUNDING * (abs(s.x) + abs(s.y) + abs(s.z)) * t.extent * abs(inverse);
     let seam = -off * slack;
     // False for NaN, as for a ray in the triangle's plane.
-    let is_met = facing != 0.0 && u >= seam && v >= seam && u + v <= 1.0 - seam
+    let is_hit = facing != 0.0 && u >= seam && v >= seam && u + v <= 1.0 - seam
         && distance - off * t.extent > ray.near && distance <= end
         && (facing > 0.0 || (t.flags & BACK_IS_COVERED) == 0u);
     var hit = Hit(distance, clamp(u, 0.0, 1.0), 0.0, NOTHING, facing > 0.0, off * t.extent);
     hit.v = clamp(v, 0.0, 1.0 - hit.u);
-    if is_met {
+    if is_hit {
         if (t.flags & HAS_HOLES) == 0u || is_solid(t.index, hit.u, hit.v) {
             hit.triangle = k;
         }
@@ -118,16 +106,16 @@ fn meet(k: u32, ray: Ray, end: f32, slack: f32) -> Hit {
     return hit;
 }
 
-fn place_of_mask(k: u32) -> vec4f {
-    return textureLoad(mask_places, vec2u(k % TEXELS_A_LINE, k / TEXELS_A_LINE), 0);
+fn mask_texel(k: u32) -> vec4f {
+    return textureLoad(mask_coordinates, vec2u(k % TEXELS_PER_LINE, k / TEXELS_PER_LINE), 0);
 }
 
 // Whether a triangle's mask is solid there.
 fn is_solid(index: u32, u: f32, v: f32) -> bool {
-    let a_b = place_of_mask(3u * index);
-    let c = place_of_mask(3u * index + 1u);
-    let size = vec2f(c.w, place_of_mask(3u * index + 2u).x);
-    let is_clamped = place_of_mask(3u * index + 2u).y != 0.0;
+    let a_b = mask_texel(3u * index);
+    let c = mask_texel(3u * index + 1u);
+    let size = vec2f(c.w, mask_texel(3u * index + 2u).x);
+    let is_clamped = mask_texel(3u * index + 2u).y != 0.0;
     var at = a_b.xy * (1.0 - u - v) + a_b.zw * u + c.xy * v;
     if is_clamped {
         at = clamp(at, vec2f(0.0), size);
@@ -138,14 +126,14 @@ fn is_solid(index: u32, u: f32, v: f32) -> bool {
     let first = u32(c.z);
     let texel = cell.y * u32(size.x) + cell.x;
     let word = first + texel / 32u;
-    let bits = textureLoad(masks, vec2u(word % TEXELS_A_LINE, word / TEXELS_A_LINE), 0).x;
+    let bits = textureLoad(masks, vec2u(word % TEXELS_PER_LINE, word / TEXELS_PER_LINE), 0).x;
     return ((bits >> (texel % 32u)) & 1u) != 0u;
 }
 
 // Inverse of a direction, with a lower bound on its components, so that it is finite.
 fn inverse_of(direction: vec3f) -> vec3f {
-    let least = select(vec3f(-1e-20), vec3f(1e-20), direction >= vec3f(0.0));
-    return 1.0 / select(direction, least, abs(direction) < vec3f(1e-20));
+    let smallest = select(vec3f(-1e-20), vec3f(1e-20), direction >= vec3f(0.0));
+    return 1.0 / select(direction, smallest, abs(direction) < vec3f(1e-20));
 }
 
 // The child of node k to be entered next, the other one on the stack; NOTHING if none is hit.
@@ -215,7 +203,7 @@ fn nearest_but(ray: Ray, own: u32) -> Hit {
         let first = node & 0x1fffffffu;
         let last = first + ((node >> 29u) & 3u);
         for (var k = first; k <= last; k++) {
-            let hit = meet(k, ray, best.distance, 1.0);
+            let hit = intersect(k, ray, best.distance, 1.0);
             if hit.triangle != NOTHING {
                 let index = triangles[k].index;
                 if index != own && (hit.distance < best.distance || index < best_index) {
@@ -250,7 +238,7 @@ fn is_hidden(ray: Ray, end: f32, but: u32) -> bool {
         let first = node & 0x1fffffffu;
         let last = first + ((node >> 29u) & 3u);
         for (var k = first; k <= last; k++) {
-            let hit = meet(k, ray, end, 1.0);
+            let hit = intersect(k, ray, end, 1.0);
             if hit.triangle != NOTHING && hit.distance + hit.off < end
                 && !(hit.front && triangles[k].light == but) {
                 return true;

@@ -33,58 +33,50 @@ pub struct RowCost {
     pub ray_level: f64,
 }
 
-/// Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle cut into
-/// 1 to 4096, at 16 to 256 pixels. The error of hemicubes is up to a half, that of rays up to a
-/// factor of two. Rays on it: `docs/data/device.tsv`.
-const SOFTWARE: RowCost = RowCost {
-    hemicube: 1.8e-4,
-    triangle: 1.3e-7,
-    pixel: 5.8e-9,
-    device_row: 1e-3,
-    device_ray_level: 3.5e-7,
-    ray_level: 8.5e-9,
-};
-
-/// NVIDIA H200 (Vulkan, driver 580) beside 16 cores: rooms of 38 and 4 010 triangles, 64 to 256
-/// pixels (`docs/data/device.tsv`). The error of hemicubes is a tenth, that of rays on the device a
-/// third.
-const DISCRETE: RowCost = RowCost {
-    hemicube: 7.9e-5,
-    triangle: 1.4e-8,
-    pixel: 3.9e-10,
-    device_row: 6e-6,
-    device_ray_level: 8e-11,
-    ray_level: 2.5e-9,
-};
-
-/// Not measured: an eighth of the other's rays, a tenth of its pixels, and the two cores.
-const INTEGRATED: RowCost = RowCost {
-    pixel: 3.9e-9,
-    device_row: 1e-5,
-    device_ray_level: 6.4e-10,
-    ray_level: SOFTWARE.ray_level,
-    ..DISCRETE
-};
-
 /// Number of rays of a row with the error of a hemicube, over N²: 1.3 to 2.0 in the Cornell box, a
 /// furnished room and a hall, at 16 to 128 pixels; their geometric mean.
 pub const RAYS_AT_EQUAL_ERROR: f64 = 1.7;
 
-/// Minimum number of triangles in the cost: for smaller scenes, the cost of rays grows faster with
-/// the number of triangles than that of hemicubes, and adding triangles could favour hemicubes
-/// again.
-const MIN_TRIANGLES: usize = 512;
-
-/// The same for rays on a device: an H200 takes 1.0 ns per ray (38 triangles) to 1.2 ns (4 010).
+/// Minimum number of triangles in the cost of rays on a device: an H200 takes 1.0 ns per ray (38
+/// triangles) to 1.2 ns (4 010).
 pub const MIN_DEVICE_TRIANGLES: usize = 8192;
 
 impl RowCost {
     /// The cost for an adapter of `kind`; that of the fastest for unknown kinds.
     pub fn of(kind: AdapterKind) -> RowCost {
+        // Lavapipe (Mesa 22.3) on two cores of an AMD EPYC server: the Cornell box, each triangle
+        // cut into 1 to 4096, at 16 to 256 pixels. The error of hemicubes is up to a half, that of
+        // rays up to a factor of two. Rays on it: `docs/data/device.tsv`.
+        let software = RowCost {
+            hemicube: 1.8e-4,
+            triangle: 1.3e-7,
+            pixel: 5.8e-9,
+            device_row: 1e-3,
+            device_ray_level: 3.5e-7,
+            ray_level: 8.5e-9,
+        };
+        // NVIDIA H200 (Vulkan, driver 580) beside 16 cores: rooms of 38 and 4 010 triangles, 64 to
+        // 256 pixels (`docs/data/device.tsv`). The error of hemicubes is a tenth, that of rays on
+        // the device a third.
+        let discrete = RowCost {
+            hemicube: 7.9e-5,
+            triangle: 1.4e-8,
+            pixel: 3.9e-10,
+            device_row: 6e-6,
+            device_ray_level: 8e-11,
+            ray_level: 2.5e-9,
+        };
         match kind {
-            AdapterKind::Cpu => SOFTWARE,
-            AdapterKind::IntegratedGpu => INTEGRATED,
-            AdapterKind::DiscreteGpu | AdapterKind::VirtualGpu | AdapterKind::Other => DISCRETE,
+            AdapterKind::Cpu => software,
+            AdapterKind::DiscreteGpu | AdapterKind::VirtualGpu | AdapterKind::Other => discrete,
+            // Not measured: an eighth of the other's rays, a tenth of its pixels, and two cores.
+            AdapterKind::IntegratedGpu => RowCost {
+                pixel: 3.9e-9,
+                device_row: 1e-5,
+                device_ray_level: 6.4e-10,
+                ray_level: software.ray_level,
+                ..discrete
+            },
         }
     }
 
@@ -114,7 +106,9 @@ impl RowCost {
         triangles: usize,
         resolution: u32,
     ) -> Option<RowMaker> {
-        let triangles = triangles.max(MIN_TRIANGLES);
+        // For smaller scenes, the cost of rays grows faster with the number of triangles than that
+        // of hemicubes, and adding triangles could favour hemicubes again.
+        let triangles = triangles.max(512);
         let rays = RAYS_AT_EQUAL_ERROR * f64::from(resolution).powi(2);
         let seconds = |maker: &RowMaker| match maker {
             RowMaker::Hemicubes => self.hemicube_seconds(triangles, resolution),
@@ -145,10 +139,9 @@ mod tests {
         AdapterKind::Cpu,
     ];
 
-    const MAKERS: [RowMaker; 3] = [RowMaker::Hemicubes, RowMaker::DeviceRays, RowMaker::Rays];
-
     fn cheapest(kind: AdapterKind, triangles: usize, resolution: u32) -> RowMaker {
-        RowCost::of(kind).cheapest(MAKERS, triangles, resolution).unwrap()
+        let makers = [RowMaker::Hemicubes, RowMaker::DeviceRays, RowMaker::Rays];
+        RowCost::of(kind).cheapest(makers, triangles, resolution).unwrap()
     }
 
     #[test]

@@ -139,7 +139,7 @@ impl GatherPoint {
 
 impl SurfaceOffset {
     pub fn new(scene: &Scene) -> SurfaceOffset {
-        SurfaceOffset { min_offset: offset::MIN_LIFT_ULPS * scene.coordinate_ulp() }
+        SurfaceOffset { min_offset: offset::min_lift(scene) }
     }
 
     /// The gather point above the viewpoint of `node`.

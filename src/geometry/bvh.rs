@@ -156,19 +156,19 @@ mod tests {
     fn visit_reaches_overlaps_and_stops() {
         let (boxes, bvh) = row(100);
         let query = Aabb { low: DVec3::X * 20.5, high: DVec3::X * 29.5 };
-        let mut found = vec![];
+        let mut visited = vec![];
         bvh.visit(
             |bounds| bounds.overlaps(&query),
             |k| {
-                found.push(k);
+                visited.push(k);
                 ControlFlow::Continue(())
             },
         );
         for k in 0..100 {
-            assert!(found.contains(&k) || !boxes[k as usize].overlaps(&query), "{k}");
+            assert!(visited.contains(&k) || !boxes[k as usize].overlaps(&query), "{k}");
         }
         // Ten overlap; a leaf at either end adds up to two more.
-        assert!(found.len() <= 14, "{}", found.len());
+        assert!(visited.len() <= 14, "{}", visited.len());
         let mut visited = 0;
         bvh.visit(
             |_| true,

@@ -55,7 +55,7 @@ mod tests {
     fn signed_distances_of_points_and_boxes() {
         // x + 2y + 2z = 6: two along the normal (1, 2, 2)/3.
         let plane = Plane::through(DVec3::new(6.0, 0.0, 0.0), DVec3::new(1.0, 2.0, 2.0) / 3.0);
-        let close = |found: f64, right: f64| assert!((found - right).abs() < 1e-15, "{found}");
+        let close = |actual: f64, right: f64| assert!((actual - right).abs() < 1e-15, "{actual}");
         close(plane.signed_distance(DVec3::ZERO), -2.0);
         close(plane.signed_distance(plane.nearest_to_origin()), 0.0);
         let corners = [DVec3::ZERO, DVec3::splat(3.0), DVec3::NEG_Z];

@@ -73,12 +73,13 @@ mod tests {
         let mut points: Vec<DVec2> =
             [(0., 0.), (5., 0.), (5., 2.), (0., 2.)].map(|(x, y)| at(x, y)).into();
         points.extend((0..50).map(|k| at(0.1 * f64::from(k), 0.03 * f64::from(k))));
-        let found = Rectangle::around(&points).unwrap();
-        let [long, short] = [found.size.max_element(), found.size.min_element()];
+        let rectangle = Rectangle::around(&points).unwrap();
+        let [long, short] = [rectangle.size.max_element(), rectangle.size.min_element()];
         // A few roundings of sums of products below 10.
-        assert!((long - 5.0).abs() < 1e-14 && (short - 2.0).abs() < 1e-14, "{found:?}");
-        let middle =
-            found.corner + found.axis * found.size.x / 2.0 + found.axis.perp() * found.size.y / 2.0;
+        assert!((long - 5.0).abs() < 1e-14 && (short - 2.0).abs() < 1e-14, "{rectangle:?}");
+        let middle = rectangle.corner
+            + rectangle.axis * rectangle.size.x / 2.0
+            + rectangle.axis.perp() * rectangle.size.y / 2.0;
         assert!(middle.distance(at(2.5, 1.0)) < 1e-14);
     }
 

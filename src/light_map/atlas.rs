@@ -137,7 +137,7 @@ impl Atlas {
     }
 
     /// The same for the point with these weights of the second and third corner.
-    pub(super) fn place(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
+    pub(super) fn texel_position(&self, t: usize, [u, v]: [f64; 2]) -> DVec2 {
         let [a, b, c] = self.corners(t);
         a * (1.0 - u - v) + b * u + c * v
     }

@@ -92,21 +92,21 @@ fn extent_between(corners: [DVec2; 3], low: f64, high: f64) -> Option<(f64, f64)
     extent
 }
 
-/// The point of a triangle that is nearest to `place`, by the weights of the second and third
+/// The point of a triangle that is nearest to `point`, by the weights of the second and third
 /// corner, and the square of its distance.
-pub(super) fn nearest_point([a, b, c]: [DVec2; 3], place: DVec2) -> ([f64; 2], f64) {
+pub(super) fn nearest_point([a, b, c]: [DVec2; 3], point: DVec2) -> ([f64; 2], f64) {
     let double_area = (b - a).perp_dot(c - a);
-    let (u, v) = ((place - a).perp_dot(c - a), (b - a).perp_dot(place - a));
+    let (u, v) = ((point - a).perp_dot(c - a), (b - a).perp_dot(point - a));
     let [u, v] = [u, v].map(|x| x / double_area);
     if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
         return ([u, v], 0.0);
     }
     let on_side = |from: DVec2, to: DVec2, weights: fn(f64) -> [f64; 2]| {
         let along = to - from;
-        let share = (place - from).dot(along) / along.length_squared();
+        let share = (point - from).dot(along) / along.length_squared();
         // A side without length is a point.
         let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
-        (weights(share), (from + along * share).distance_squared(place))
+        (weights(share), (from + along * share).distance_squared(point))
     };
     let sides = [
         on_side(a, b, |s| [s, 0.0]),
@@ -116,11 +116,11 @@ pub(super) fn nearest_point([a, b, c]: [DVec2; 3], place: DVec2) -> ([f64; 2], f
     sides.into_iter().fold(([0.0; 2], f64::INFINITY), |x, y| if y.1 < x.1 { y } else { x })
 }
 
-/// Distance of `place` inside a triangle from its nearest side; negative outside.
-pub(super) fn depth_inside([a, b, c]: [DVec2; 3], place: DVec2) -> f64 {
+/// Distance of `point` inside a triangle from its nearest side; negative outside.
+pub(super) fn depth_inside([a, b, c]: [DVec2; 3], point: DVec2) -> f64 {
     let turn = (b - a).perp_dot(c - a).signum();
     let side =
-        |from: DVec2, to: DVec2| turn * (to - from).perp_dot(place - from) / (to - from).length();
+        |from: DVec2, to: DVec2| turn * (to - from).perp_dot(point - from) / (to - from).length();
     side(a, b).min(side(b, c)).min(side(c, a))
 }
 
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn nearest_point_of_a_triangle() {
         let corners = [[0.0, 0.0], [4.0, 0.0], [0.0, 2.0]].map(DVec2::from);
-        for (place, weights, square) in [
+        for (point, weights, square) in [
             ([1.0, 0.5], [0.25, 0.25], 0.0),
             ([1.0, -3.0], [0.25, 0.0], 9.0),
             ([-1.0, 0.5], [0.0, 0.25], 1.0),
@@ -177,8 +177,8 @@ mod tests {
             // One along the normal (1, 2) from the middle of the long side.
             ([3.0, 3.0], [0.5, 0.5], 5.0),
         ] {
-            let (found, distance) = nearest_point(corners, place.into());
-            assert_eq!((found, distance), (weights, square), "{place:?}");
+            let (nearest, distance) = nearest_point(corners, point.into());
+            assert_eq!((nearest, distance), (weights, square), "{point:?}");
         }
         // A triangle without area is its longest side.
         let flat = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].map(DVec2::from);

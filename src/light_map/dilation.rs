@@ -24,20 +24,20 @@ pub(super) fn fill_from_neighbours(
         rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
     };
     for _ in 0..rings {
-        let mut found = vec![];
+        let mut filled = vec![];
         texels.retain(|&texel| {
             let known = neighbours(texel).filter(|&k| known[k as usize]);
             let (sum, count) =
                 known.fold((Rgb::ZERO, 0), |(sum, n), k| (sum + values[k as usize], n + 1));
             if count > 0 {
-                found.push((texel, sum / f64::from(count)));
+                filled.push((texel, sum / f64::from(count)));
             }
             count == 0
         });
-        if found.is_empty() {
+        if filled.is_empty() {
             break;
         }
-        for (texel, value) in found {
+        for (texel, value) in filled {
             (values[texel as usize], known[texel as usize]) = (value, true);
         }
     }

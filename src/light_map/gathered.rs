@@ -66,8 +66,8 @@ impl LightMap {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<LightMap>, Error> {
         check_scene(&atlas, light)?;
-        let places = (0..atlas.coordinates.len()).map(|t| atlas.corners(t));
-        let triangles = triangles_of_texels(atlas.size, places);
+        let corners = (0..atlas.coordinates.len()).map(|t| atlas.corners(t));
+        let triangles = triangles_of_texels(atlas.size, corners);
         let covered: Vec<u32> = (0..triangles.len() as u32)
             .filter(|&texel| triangles[texel as usize] != NO_TRIANGLE)
             .collect();

@@ -37,13 +37,13 @@ pub(super) fn layout(
     let coordinates: Vec<[DVec2; 3]> =
         triangles.map(|t| downwards(scene.texture_coordinates(t).unwrap_or(none))).collect();
     let count = |is: fn(&[DVec2; 3]) -> bool| coordinates.iter().filter(|c| is(c)).count();
-    for (found, unusable) in [
+    for (count, unusable) in [
         (count(|c| !c.iter().all(|p| p.is_finite())), Unusable::Missing as fn(usize) -> Unusable),
         (count(|c| !c.iter().all(is_inside)), Unusable::Outside),
         (count(|c| area(c) < f64::EPSILON), Unusable::Collapsed),
     ] {
-        if found > 0 {
-            return Ok(Err(unusable(found)));
+        if count > 0 {
+            return Ok(Err(unusable(count)));
         }
     }
     let side = match resolution {
@@ -77,7 +77,7 @@ fn area([a, b, c]: &[DVec2; 3]) -> f64 {
 /// so that its time is bounded by the number of texels, however many triangles overlap.
 fn overlapping(coordinates: &[[DVec2; 3]], size: [u32; 2]) -> Option<[usize; 2]> {
     let mut owners = vec![NO_TRIANGLE; size[0] as usize * size[1] as usize];
-    let mut found = None;
+    let mut overlap = None;
     for (t, &corners) in coordinates.iter().enumerate() {
         let corners = in_texels(corners, size);
         for_each_texel_around(corners, 0.0, size, |texel, centre| {
@@ -85,16 +85,16 @@ fn overlapping(coordinates: &[[DVec2; 3]], size: [u32; 2]) -> Option<[usize; 2]>
             if depth_inside(corners, centre) > 0.25 {
                 let owner = std::mem::replace(&mut owners[texel], t as u32);
                 if owner != NO_TRIANGLE {
-                    found = Some([owner as usize, t]);
+                    overlap = Some([owner as usize, t]);
                 }
             }
-            found.is_none()
+            overlap.is_none()
         });
-        if found.is_some() {
+        if overlap.is_some() {
             break;
         }
     }
-    found
+    overlap
 }
 
 impl fmt::Display for Unusable {

@@ -65,15 +65,15 @@ impl LightMap {
         let mut gatherer = gatherer(baked, backend)?;
         let field = baked.light.radiosity_field();
         let diagonal = baked.settings.solve.light_diagonal(self.atlas.scene());
-        let mut found = vec![];
+        let mut errors = vec![];
         let order = golden_ratio_order(points.len());
         let (mut remaining, mut batches) = (&order[..], BatchSizer::new(64));
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
                 let mut gather = |which: usize| {
-                    let places: Vec<TwoSidedPoint> =
+                    let points: Vec<TwoSidedPoint> =
                         batch.iter().map(|&k| points[k].points[which]).collect();
-                    gather_two_sided(&mut *gatherer, &field, &places)
+                    gather_two_sided(&mut *gatherer, &field, &points)
                 };
                 let (first, second) = (gather(0)?, gather(1)?);
                 for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
@@ -81,7 +81,7 @@ impl LightMap {
                     let pair = [first, second];
                     if !outlook(pair).is_hidden(diagonal) {
                         let gathered = pair.map(|sample| albedo * sample.irradiance);
-                        found.push(Found { shown, gathered, area });
+                        errors.push(TexelError { shown, gathered, area });
                     }
                 }
                 Ok::<_, Error>(())
@@ -91,7 +91,7 @@ impl LightMap {
             }
         }
         let measure = baked.settings.measure;
-        Ok(root_mean_square(&found, measure, baked.estimate.of_light()))
+        Ok(root_mean_square(&errors, measure, baked.estimate.of_light()))
     }
 
     /// Half of the points lie evenly over the reflecting surfaces, half in the cells between four
@@ -117,10 +117,10 @@ impl LightMap {
                 return None;
             }
             scene.first_solid(t, std::iter::once(barycentric))?;
-            let place = self.atlas.place(t, barycentric);
+            let position = self.atlas.texel_position(t, barycentric);
             let texel = texels.texel_size(t);
-            let share = match self.triangles_of_cell(place).contains(&(t as u32)) {
-                true => contrasts[self.cell(place)] / cells.total_area().max(f64::MIN_POSITIVE),
+            let share = match self.triangles_of_cell(position).contains(&(t as u32)) {
+                true => contrasts[self.cell(position)] / cells.total_area().max(f64::MIN_POSITIVE),
                 false => 0.0,
             };
             let density = 1.0 / surface.total_area() + share / (texel * texel);
@@ -138,32 +138,32 @@ impl LightMap {
             let shown = albedo * self.irradiance_at(t, barycentric);
             Some(ShownPoint { points: [point, beside], albedo, shown, area: 1.0 / density })
         };
-        let even = surface.spread(count, 0.5).map(|place| (place.triangle, place.barycentric));
+        let even = surface.spread(count, 0.5).map(|at| (at.triangle, at.barycentric));
         let even: Vec<ShownPoint> = even.filter_map(point).collect();
         let in_cell = |k: usize| {
             let (cell, _) = cells.locate((k as f64 + 0.5) / count as f64);
             let corner = [cell as u32 % self.atlas.width(), cell as u32 / self.atlas.width()];
-            let place = DVec2::from(corner.map(f64::from)) + DVec2::from(r2_point(k, 0.5));
+            let position = DVec2::from(corner.map(f64::from)) + DVec2::from(r2_point(k, 0.5));
             let on_triangle = |&t: &u32| {
                 let [a, b, c] = self.atlas.corners(t as usize).map(|p| p.extend(0.0));
-                let [u, v] = barycentric([a, b, c], DVec3::Z, place.extend(0.0));
+                let [u, v] = barycentric([a, b, c], DVec3::Z, position.extend(0.0));
                 let is_inside = u.min(v).min(1.0 - u - v) >= 0.0;
                 is_inside.then_some((t as usize, [u, v]))
             };
-            point(self.triangles_of_cell(place).iter().find_map(on_triangle)?)
+            point(self.triangles_of_cell(position).iter().find_map(on_triangle)?)
         };
         let count = if cells.total_area() > 0.0 { count } else { 0 };
         even.into_iter().chain((0..count).filter_map(in_cell)).collect()
     }
 
-    /// The upper left texel of the cell around a point `place` in units of texels.
-    fn cell(&self, place: DVec2) -> usize {
-        Footprint::of(place, self.atlas.size).texels[0] as usize
+    /// The upper left texel of the cell around a point `position` in units of texels.
+    fn cell(&self, position: DVec2) -> usize {
+        Footprint::of(position, self.atlas.size).texels[0] as usize
     }
 
-    /// The triangles on which the texels around a point `place` gather, or none; some repeated.
-    fn triangles_of_cell(&self, place: DVec2) -> [u32; 4] {
-        Footprint::of(place, self.atlas.size).texels.map(|texel| self.triangles[texel as usize])
+    /// The triangles on which the texels around a point `position` gather, or none; some repeated.
+    fn triangles_of_cell(&self, position: DVec2) -> [u32; 4] {
+        Footprint::of(position, self.atlas.size).texels.map(|texel| self.triangles[texel as usize])
     }
 
     /// Contrast of each cell: the difference of its four texels as a fraction of the darkest, by
@@ -195,7 +195,7 @@ impl LightMap {
 }
 
 /// The values at a point.
-struct Found {
+struct TexelError {
     /// Reflected radiosity, W/m²: of the map, and gathered twice.
     shown: Rgb,
     gathered: [Rgb; 2],
@@ -203,7 +203,7 @@ struct Found {
     area: f64,
 }
 
-impl Found {
+impl TexelError {
     fn mean(&self) -> Rgb {
         (self.gathered[0] + self.gathered[1]) / 2.0
     }
@@ -217,19 +217,19 @@ impl Found {
     }
 }
 
-/// The error by what was `found`, and by that of the `light`.
-fn root_mean_square(found: &[Found], measure: Measure, light: f64) -> Option<Estimate> {
-    let sum = |of: &dyn Fn(&Found) -> f64| found.iter().map(of).sum::<f64>();
+/// The error by those at points, `errors`, and by that of the `light`.
+fn root_mean_square(errors: &[TexelError], measure: Measure, light: f64) -> Option<Estimate> {
+    let sum = |of: &dyn Fn(&TexelError) -> f64| errors.iter().map(of).sum::<f64>();
     let brightness = sum(&|point| point.area * point.mean().length()) / sum(&|point| point.area);
     // Where nothing arrives, nothing is wrong.
     let floor = (measure.floor * brightness).max(f64::MIN_POSITIVE);
-    let point = |point: &Found| MeasuredPoint {
+    let point = |point: &TexelError| MeasuredPoint {
         stratum: 0,
         area: point.area,
         error: point.square_error(floor),
     };
-    let points: Vec<MeasuredPoint> = found.iter().map(point).collect();
+    let points: Vec<MeasuredPoint> = errors.iter().map(point).collect();
     let mut mean = TrimmedSquare::new(&points, measure.tail)?.mean;
     mean.value = mean.value.max(0.0) + light * light;
-    (found.len() > 1).then(|| mean.root())
+    (errors.len() > 1).then(|| mean.root())
 }

@@ -11,7 +11,8 @@ impl LightMap {
     /// The irradiance that the map shows at a point of triangle `t` of its scene, whose second and
     /// third corner have these weights: interpolated bilinearly, W/m² per channel.
     pub fn irradiance_at(&self, t: usize, weights: [f64; 2]) -> Rgb {
-        Footprint::of(self.atlas.place(t, weights), self.atlas.size).value(&self.irradiance)
+        Footprint::of(self.atlas.texel_position(t, weights), self.atlas.size)
+            .value(&self.irradiance)
     }
 
     /// The scene lit by the map, with elements about as large as texels that each have their own

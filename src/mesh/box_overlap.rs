@@ -31,7 +31,7 @@ pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> 
     let first_partners = |k: usize| first_partners(&tree, boxes, k);
     let mut partners: Vec<Vec<u32>> =
         (0..boxes.len()).into_par_iter().map(first_partners).collect();
-    let crowded: Vec<bool> = partners.iter().map(|found| found.len() > MAX_OVERLAPS).collect();
+    let crowded: Vec<bool> = partners.iter().map(|of_box| of_box.len() > MAX_OVERLAPS).collect();
     let mut ranked: Vec<u32> = (0..boxes.len() as u32).filter(|&k| crowded[k as usize]).collect();
     for &k in &ranked {
         partners[k as usize].clear();

@@ -298,7 +298,7 @@ mod tests {
             };
             let slit: Vec<[DVec3; 3]> = pieces.iter().filter(in_slit).copied().collect();
             let expected = if is_slit { 3.0 * width } else { 0.0 };
-            // Its two sides of 3 may snap by so much.
+            // Its two sides of length 3 may snap by this.
             let off = 6.0 * SNAP_DISTANCE * SHORTEST_CUT * 0.1;
             assert!((area(&slit) - expected).abs() < off, "{width}: {}", area(&slit));
         }
@@ -308,7 +308,10 @@ mod tests {
     fn what_is_hidden_or_small_is_not_cut() {
         let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
-        assert!(Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)), "nobody looks into a box");
+        assert!(
+            Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)),
+            "the inside of a box is not visible"
+        );
         // The floor is visible through a hole in the lid, which fills 1/30 of the view from floor
         // beside a wall.
         let lid = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {

@@ -33,13 +33,13 @@ use crate::scene::{Piece, Scene, longest_edge};
 /// of the region.
 pub(crate) fn cut_large_triangles(scene: &Arc<Scene>, region: &Aabb) -> Arc<Scene> {
     // Smaller pieces are lost in the rounding of coordinates.
-    let least = region.diagonal().max(scene.reflecting_bounds().diagonal() / 1e9);
+    let min_extent = region.diagonal().max(scene.reflecting_bounds().diagonal() / 1e9);
     let is_large = |t: usize, corners: &[DVec3; 3]| {
         let material = scene.material(t);
         // Glass cut only partly would enclose no body.
         material.scatters()
             && !material.specular.is_some_and(|specular| specular.is_glass())
-            && longest_edge(*corners) > least * size_growth(Some(region), corners)
+            && longest_edge(*corners) > min_extent * size_growth(Some(region), corners)
     };
     let count = scene.triangles().len();
     if !(0..count).any(|t| is_large(t, &scene.corners(t))) {
@@ -134,7 +134,7 @@ impl Bisection {
     /// conforming result; returns the pieces of each triangle, unless there are too many.
     fn run(mut self, is_large: impl Fn(usize, &[DVec3; 3]) -> bool) -> Option<Vec<Vec<Piece>>> {
         let triangles = self.parts.len();
-        let most = (2 * triangles).max(1 << 18);
+        let max_parts = (2 * triangles).max(1 << 18);
         let mut pending: Vec<usize> = (0..triangles).collect();
         while let Some(p) = pending.pop() {
             let Part { triangle, corners, .. } = self.parts[p];
@@ -142,7 +142,7 @@ impl Bisection {
                 pending.push(p);
                 self.halve_next(p, &mut pending);
             }
-            if self.parts.len() > most {
+            if self.parts.len() > max_parts {
                 return None;
             }
         }
@@ -240,15 +240,15 @@ mod tests {
             assert!((area / (8.0 * half * half) - 1.0).abs() < 1e-12);
             let grey = pieces.iter().filter(|&&t| cut.triangles()[t].material == 0);
             for corners in grey.map(|&t| cut.corners(t)) {
-                let most = region().diagonal() * size_growth(Some(&region()), &corners);
-                assert!(longest_edge(corners) <= most, "{half}: {corners:?}");
+                let max_edge = region().diagonal() * size_growth(Some(&region()), &corners);
+                assert!(longest_edge(corners) <= max_edge, "{half}: {corners:?}");
             }
             // The black quad is not cut. Between squares of half a side r and 2 r around the light
             // there is an area of 12 r², and a piece has r²/8 at least: halves of a square whose
             // diagonal is over r / √2. So there are at most 96 of them per octave.
             assert_eq!(pieces.iter().filter(|&&t| cut.triangles()[t].material == 1).count(), 2);
-            let most = last + (100f64.log2() * 96.0) as usize;
-            assert!(pieces.len() > last && pieces.len() < most, "{half}: {}", pieces.len());
+            let max_pieces = last + (100f64.log2() * 96.0) as usize;
+            assert!(pieces.len() > last && pieces.len() < max_pieces, "{half}: {}", pieces.len());
             last = pieces.len();
         }
     }

@@ -121,8 +121,8 @@ mod tests {
     fn places_in_a_cell_are_found_in_the_triangle() {
         for cell in level(3) {
             let [a, b, c] = cell.corners();
-            for (place, corner) in [([0.0, 0.0], a), ([1.0, 0.0], b), ([0.0, 1.0], c)] {
-                assert_eq!(cell.in_triangle(place), corner);
+            for (at, corner) in [([0.0, 0.0], a), ([1.0, 0.0], b), ([0.0, 1.0], c)] {
+                assert_eq!(cell.in_triangle(at), corner);
             }
             let [u, v] = cell.in_triangle([0.25, 0.125]);
             assert_eq!(cell.local(u, v), [0.25, 0.125]);

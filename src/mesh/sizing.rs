@@ -47,12 +47,12 @@ impl ElementSizing {
 }
 
 impl ElementSizing {
-    /// The same sizing scaled up until `scene` has at most `most` elements at up to `max_depth`
+    /// The same sizing scaled up until `scene` has at most `max_elements` at up to `max_depth`
     /// levels; its triangles are not merged.
-    pub fn within(&self, scene: &Scene, max_depth: u32, most: usize) -> ElementSizing {
+    pub fn within(&self, scene: &Scene, max_depth: u32, max_elements: usize) -> ElementSizing {
         let mut sizing = self.clone();
         let triangles = scene.triangles().len();
-        let bound = most.max(triangles);
+        let bound = max_elements.max(triangles);
         let longest = (0..triangles).map(|t| longest_edge(scene.corners(t))).fold(0.0, f64::max);
         while sizing.size < longest && sizing.count(scene, max_depth, bound) > bound {
             // Half as many elements.
@@ -167,11 +167,11 @@ mod tests {
         let count = |sizing: &ElementSizing| {
             Mesh::sized(scene.clone(), sizing, Mesh::MAX_DEPTH).unwrap().element_count()
         };
-        for most in [10, 1000, 100_000] {
-            let sizing = fine.within(&scene, Mesh::MAX_DEPTH, most);
-            let found = count(&sizing);
+        for max in [10, 1000, 100_000] {
+            let sizing = fine.within(&scene, Mesh::MAX_DEPTH, max);
+            let elements = count(&sizing);
             // A level of the quadtree is a factor of four.
-            assert!(found <= most && 4 * found > most, "{found} of {most}");
+            assert!(elements <= max && 4 * elements > max, "{elements} of {max}");
         }
         assert_eq!(fine.within(&scene, Mesh::MAX_DEPTH, usize::MAX), fine);
         // The triangles remain, whatever the maximum number of elements.

@@ -290,10 +290,10 @@ mod tests {
                 let order = picks.map(|k| left.remove(k));
                 let turned = |k: usize| (sheets[k].0 + turn + off * (k / 2) as f64, sheets[k].1);
                 let surfaces = fan(&order.map(turned));
-                let place = |k| surfaces[order.iter().position(|&o| o == k).unwrap()];
-                assert_eq!(place(0), place(1), "{order:?}");
-                assert_eq!(place(2), place(3), "{order:?}");
-                assert_ne!(place(0), place(2), "{order:?}");
+                let surface_of = |k| surfaces[order.iter().position(|&o| o == k).unwrap()];
+                assert_eq!(surface_of(0), surface_of(1), "{order:?}");
+                assert_eq!(surface_of(2), surface_of(3), "{order:?}");
+                assert_ne!(surface_of(0), surface_of(2), "{order:?}");
             }
         }
     }

@@ -95,23 +95,23 @@ impl Transmission {
 
 /// Elements below `other` that share area with `node`, in one plane, and that area without holes.
 fn overlaps(mesh: &Mesh, node: NodeId, other: NodeId) -> Vec<(usize, f64)> {
-    let (mut open, mut found) = (vec![other], vec![]);
+    let (mut open, mut facing) = (vec![other], vec![]);
     while let Some(other) = open.pop() {
-        let least = COINCIDENCE_TOLERANCE * mesh.area(node).min(mesh.area(other));
+        let min_area = COINCIDENCE_TOLERANCE * mesh.area(node).min(mesh.area(other));
         let shared = shared_polygon(mesh, node, other);
         let area = polygon_area(&shared);
-        if area <= least {
+        if area <= min_area {
             continue;
         }
         match mesh.children(other) {
             Some(children) => open.extend(children.into_iter().rev()),
             None => match solid_share(mesh, node, &shared) * area {
-                area if area <= least => {}
-                area => found.push((mesh.elements_of(other).start, area)),
+                area if area <= min_area => {}
+                area => facing.push((mesh.elements_of(other).start, area)),
             },
         }
     }
-    found
+    facing
 }
 
 /// The intersection of two nodes in one plane.

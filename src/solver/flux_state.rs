@@ -234,10 +234,6 @@ pub(super) struct FluxState<'m> {
     pub ledger: Ledger,
 }
 
-/// Largest difference between emitted and accounted flux, relative to the emitted, that is taken
-/// for rounding. Sums of some 10⁹ terms in f64 stay far below.
-const MAX_ENERGY_IMBALANCE: f64 = 1e-9;
-
 impl<'m> FluxState<'m> {
     /// The emission of `mesh` and the light `received`, none of it shot.
     ///
@@ -279,21 +275,20 @@ impl<'m> FluxState<'m> {
     /// and accounted flux are equal.
     ///
     /// # Errors
-    /// [`ErrorKind::FormFactor`] when they differ by more than [`MAX_ENERGY_IMBALANCE`].
+    /// [`ErrorKind::FormFactor`] when they differ by more than 1e-9 of the emitted: sums of some
+    /// 10⁹ terms in f64 stay far below.
     pub fn recompute_and_verify_energy(&mut self) -> Result<(), Error> {
         self.ledger.unshot = self.flux.unshot.iter().map(|u| u.max(Rgb::ZERO)).sum();
         self.ledger.overshot = self.flux.unshot.iter().map(|u| (-*u).max(Rgb::ZERO)).sum();
         let imbalance = self.ledger.imbalance();
-        if imbalance <= MAX_ENERGY_IMBALANCE {
+        if imbalance <= 1e-9 {
             return Ok(());
         }
         Err(Error::new(
             ErrorKind::FormFactor,
             "energy ledger",
             format!("emitted and accounted flux differ by {imbalance:e} of the emitted"),
-            format!(
-                "they must agree to {MAX_ENERGY_IMBALANCE:e}; rows that are not finite can do this"
-            ),
+            "they must agree to 1e-9; rows that are not finite can do this",
         ))
     }
 

@@ -21,7 +21,7 @@ use super::flux_state::{Flux, FluxState};
 use super::geometry_delta::GeometryDelta;
 use super::ledger::{Ledger, largest_share};
 use super::method_state::MethodState;
-use super::staleness::{MAX_BOUND_OVER_UNSHOT, MAX_STALE_FRACTION};
+use super::staleness::{is_usable, max_stale_flux_bound};
 use super::{Progress, SolveSession};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{FormFactors, Row};
@@ -87,7 +87,7 @@ impl<'m> SolveSession<'m> {
         let stale = self.patches_by_misplaced_flux();
         let mut stop = Ok(StopReason::Converged);
         let mut remaining = &stale[..];
-        let max_bound = MAX_BOUND_OVER_UNSHOT * self.solver.unshot;
+        let max_bound = max_stale_flux_bound(self.solver.unshot);
         while self.stale_flux_bound() > max_bound && !remaining.is_empty() {
             let batch_len = after.preferred_batch_len().clamp(1, remaining.len());
             let (batch, others) = remaining.split_at(batch_len);
@@ -104,7 +104,7 @@ impl<'m> SolveSession<'m> {
             }
         }
         for patch in stale {
-            if self.rows.histories[&patch].stale_fraction > MAX_STALE_FRACTION {
+            if !is_usable(self.rows.histories[&patch].stale_fraction) {
                 self.rows.evict(patch);
             }
         }
@@ -140,7 +140,7 @@ impl<'m> SolveSession<'m> {
         let fractions: Vec<f64> = patches.par_iter().map(affected_fraction).collect();
         for (patch, fraction) in patches.into_iter().zip(fractions) {
             let history = self.rows.histories.entry(patch).or_default();
-            if history.stale_fraction > MAX_STALE_FRACTION || !history.cached {
+            if !is_usable(history.stale_fraction) || !history.cached {
                 irreparable.insert(patch, history.stale_fraction);
             }
             history.stale_fraction = (history.stale_fraction + fraction).min(1.0);

@@ -33,10 +33,6 @@ use crate::mesh::{Clusters, Mesh, NodeId};
 use crate::scene::Rgb;
 use crate::visibility::buried;
 
-/// A batch of shots ends where the unshot flux is below this share of that of its brightest patch.
-/// Plain choice; no recorded measurement.
-const MIN_BATCH_FLUX_SHARE: f64 = 0.25;
-
 /// The patches that shoot. Together they cover every element once.
 #[derive(Clone)]
 pub(super) struct PatchCut<'m> {
@@ -194,7 +190,7 @@ impl<'m> PatchCut<'m> {
 
     /// The next shots, by descending unshot flux; emitters before all others. Ends at `max_rows`
     /// patches for which `is_missing` says that the row must be computed, at `max_shots`, or where
-    /// the flux falls below [`MIN_BATCH_FLUX_SHARE`] of the first's, so that no dim patch shoots
+    /// the flux falls below a quarter of the first's (plain choice), so that no dim patch shoots
     /// before a bright one has received its light.
     pub fn next_shots(
         &mut self,
@@ -217,7 +213,7 @@ impl<'m> PatchCut<'m> {
         while let Some((is_emitter, share, Reverse(k))) = queue.pop() {
             let (emitters, min_share) = *batch_limits.get_or_insert_with(|| {
                 let share = flux.unshot_share(&self.patches[k].elements);
-                (is_emitter, tie_stable_key(share * MIN_BATCH_FLUX_SHARE))
+                (is_emitter, tie_stable_key(0.25 * share))
             });
             let is_full = shots.len() as u64 >= max_shots;
             if is_emitter != emitters || share < min_share || is_full {

@@ -14,10 +14,13 @@
 //! d₁ = Σ F_vj / r_j            mean inverse distance      1/length
 //! d₂ = Σ F_vj / r_j²           mean square of it          1/length²
 //!
-//! q = min(1, |m₁| d₁ + m₂ d₂ + w u √(m₂ d₂) + |n₁| + n₂)  share of the patch's light misplaced
+//! q = min(1, |m₁| d₁ + m₂ d₂ + 3 u √(m₂ d₂) + |n₁| + n₂)  share of the patch's light misplaced
 //! p = m₂ √(d₂ / A)             light on a spot, A the area of all surfaces
 //! error = max(√s q, min(1, s A/A_p) p),  s the share of the emitted flux that leaves the patch
 //! ```
+//!
+//! The weight 3 of unevenness is a plain choice, above 1 since a corner of the patch sends to its
+//! neighbours, not to the mean receiver.
 //!
 //! A patch with share s adds s q² to the mean square of q over all light, so that equal errors √s q
 //! put the patches where the flux is. Hanrahan, Salzman and Aupperle (1991) refine links between
@@ -37,10 +40,6 @@ use serde::{Deserialize, Serialize};
 use super::flux_state::Flux;
 use crate::form_factor::Row;
 use crate::mesh::{Mesh, NodeId};
-
-/// Weight w of unevenness: a corner of the patch sends to its neighbours, not to the mean receiver.
-/// Plain choice; no recorded measurement.
-const UNEVENNESS_WEIGHT: f64 = 3.0;
 
 /// The surfaces of a mesh.
 #[derive(Clone)]
@@ -151,8 +150,7 @@ impl SourceMoments {
         let InverseDistanceMoments { first: d1, second: d2 } = distances;
         // The square of the angle subtended by the patch.
         let solid = self.square_offset / self.flux * d2;
-        let by_position =
-            self.offset.length() / self.flux * d1 + solid + UNEVENNESS_WEIGHT * u * solid.sqrt();
+        let by_position = self.offset.length() / self.flux * d1 + solid + 3.0 * u * solid.sqrt();
         let by_normal = (self.normal_deviation.length() + self.square_normal_deviation) / self.flux;
         (by_position + by_normal).min(1.0)
     }

@@ -19,10 +19,6 @@ use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::Rgb;
 
-/// Importance of the rows of elements, which all methods but shooting use again in every step:
-/// constant whatever light they carry, so that the equations do not change between steps.
-const ELEMENT_IMPORTANCE: f64 = 1.0;
-
 /// Rows by patch, and the flux sent along each.
 #[derive(Clone)]
 pub(super) struct RowCache {
@@ -182,10 +178,13 @@ impl RowCache {
             .collect();
         uncached.truncate(batch_len);
         self.rebuild_missing(mesh, row_source, reached.iter().map(|&(_, patch)| patch))?;
+        // Full importance, whatever light they carry: all methods but shooting use them again in
+        // every step, and the equations do not change between steps.
+        let importance = 1.0;
         let new_rows = if uncached.is_empty() {
             vec![]
         } else {
-            self.make(mesh, row_source, &uncached, ELEMENT_IMPORTANCE)?
+            self.make(mesh, row_source, &uncached, importance)?
         };
         let mut new_rows = new_rows.into_iter();
         let mut rows = Vec::with_capacity(reached.len());
@@ -194,7 +193,7 @@ impl RowCache {
                 rows.push((e, row.clone()));
             } else if let Some(row) = new_rows.next() {
                 let row = Arc::new(row);
-                self.insert(patch, row.clone(), ELEMENT_IMPORTANCE);
+                self.insert(patch, row.clone(), importance);
                 rows.push((e, row));
             }
         }

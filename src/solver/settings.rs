@@ -47,27 +47,14 @@ impl Solver {
     /// in total.
     pub const DIRECT_MAX_ELEMENTS: usize = 4096;
 
-    /// Number of elements up to which [`Solver::for_mesh`] solves directly: a tenth of a second.
-    pub const AUTO_DIRECT_MAX_ELEMENTS: usize = 512;
-
-    /// Mean reflectance from which [`Solver::for_mesh`] chooses GMRES where all rows fit in memory:
-    /// shooting would follow some 70 bounces for 0.1 % unshot, where GMRES takes some 10 products.
-    pub const AUTO_GMRES_MIN_REFLECTANCE: f64 = 0.9;
-
-    /// The same where rows must be recomputed for every product: 2 300 bounces.
-    pub const AUTO_GMRES_MIN_REFLECTANCE_UNCACHED: f64 = 0.997;
-
-    /// Default of [`Solver::patch_tolerance`].
-    pub const DEFAULT_PATCH_TOLERANCE: f64 = 4e-3;
-
-    /// `method`, to 0.1 % unshot with a GiB of rows.
+    /// `method`, to 0.1 % unshot with a GiB of rows and a patch tolerance of 0.004.
     pub fn new(method: Method) -> Solver {
         Solver {
             method,
             unshot: 1e-3,
             max_steps: None,
             row_memory: 1 << 30,
-            patch_tolerance: Solver::DEFAULT_PATCH_TOLERANCE,
+            patch_tolerance: 4e-3,
             min_patch_level: 0,
         }
     }
@@ -75,22 +62,18 @@ impl Solver {
     /// Chooses the method for `mesh` by its size and its mean reflectance (by area, the highest
     /// channel), with the settings of [`Solver::new`]:
     ///
-    /// 1. direct, for up to [`Solver::AUTO_DIRECT_MAX_ELEMENTS`] elements;
-    /// 2. else GMRES, from [`Solver::AUTO_GMRES_MIN_REFLECTANCE`] if all rows fit in memory even
-    ///    when dense (8 bytes for each pair of elements), or from
-    ///    [`Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED`] if they do not;
+    /// 1. direct, for up to 512 elements: a tenth of a second;
+    /// 2. else GMRES, from a reflectance of 0.9 if all rows fit in memory even when dense (8 bytes
+    ///    for each pair of elements): shooting would follow some 70 bounces, where GMRES takes some
+    ///    10 products; from 0.997 if rows must be recomputed for every product: 2 300 bounces;
     /// 3. else shooting.
     pub fn for_mesh(mesh: &Mesh) -> Solver {
         let [shooting, _, _, _, gmres, direct] = Method::ALL.map(Solver::new);
         let reflectance = mesh.mean_albedo().max_element();
         let count = mesh.element_count();
         let all_fit = count.saturating_mul(count).saturating_mul(8) <= gmres.row_memory;
-        let bright = if all_fit {
-            Solver::AUTO_GMRES_MIN_REFLECTANCE
-        } else {
-            Solver::AUTO_GMRES_MIN_REFLECTANCE_UNCACHED
-        };
-        if count <= Solver::AUTO_DIRECT_MAX_ELEMENTS {
+        let bright = if all_fit { 0.9 } else { 0.997 };
+        if count <= 512 {
             direct
         } else if reflectance >= bright {
             gmres

@@ -25,10 +25,6 @@ use crate::mesh::{Mesh, NodeId};
 use crate::progress::StopReason;
 use crate::scene::Rgb;
 
-/// Maximum overshot flux per unshot flux. Relaxation by ω = 1 + this converges in any order where ω
-/// < 2, since exchange areas are symmetric (Ostrowski 1954).
-const MAX_OVERSHOOT: f64 = 0.8;
-
 /// The patches that shoot.
 #[derive(Clone)]
 pub(super) struct Shooting<'m> {
@@ -157,7 +153,8 @@ struct TakenFlux {
 
 impl FluxState<'_> {
     /// Takes the unshot flux of `elements`, plus the flux due to `ambient_overshoot` (W/m² per unit
-    /// of albedo), at most [`MAX_OVERSHOOT`] of the unshot flux of each.
+    /// of albedo), at most 0.8 of the unshot flux of each: relaxation by ω < 2 converges in any
+    /// order, since exchange areas are symmetric (Ostrowski 1954).
     fn take(&mut self, elements: &[Range<usize>], ambient_overshoot: Rgb) -> TakenFlux {
         let mut flux = Rgb::ZERO;
         let mut overshot = Rgb::ZERO;
@@ -167,7 +164,7 @@ impl FluxState<'_> {
             overshot += unshot.min(Rgb::ZERO);
             if ambient_overshoot != Rgb::ZERO {
                 let area = self.mesh.solid_area(self.mesh.element(e));
-                let limit = MAX_OVERSHOOT * unshot.max(Rgb::ZERO);
+                let limit = 0.8 * unshot.max(Rgb::ZERO);
                 let over = (self.flux.albedo(e) * area * ambient_overshoot).min(limit);
                 self.flux.unshot[e] -= over;
                 flux += over;

@@ -5,23 +5,26 @@
 //! flux, like the unshot share. The policy has two parts:
 //!
 //! 1. When objects move, rows are recomputed, those with most misplaced flux first, until the bound
-//!    is at most [`MAX_BOUND_OVER_UNSHOT`] × the requested unshot share. A remaining row stays in
-//!    use only if its stale fraction is at most [`MAX_STALE_FRACTION`].
+//!    is at most twice the requested unshot share. A remaining row stays in use only if its stale
+//!    fraction is at most 0.1.
 //! 2. While solving, the expected error of stale rows, a quarter of the bound, is subtracted from
-//!    the requested unshot share, down to half of it: with [`MAX_BOUND_OVER_UNSHOT`] = 2 each error
-//!    gets half.
+//!    the requested unshot share, down to half of it: with twice that share each error gets half.
 //!
 //! A vase and a chair moved in a furnished room misplaced a sixth to a half of the bound; a quarter
 //! is within that range.
 //!
 //! [`SolveSession::stale_flux_bound`]: super::SolveSession::stale_flux_bound
 
-/// Maximum bound of misplaced flux that remains when objects have moved, over the requested unshot
+/// Maximum bound of misplaced flux that remains when objects have moved, for a requested `unshot`
 /// share.
-pub(super) const MAX_BOUND_OVER_UNSHOT: f64 = 2.0;
+pub(super) fn max_stale_flux_bound(unshot: f64) -> f64 {
+    2.0 * unshot
+}
 
-/// Maximum stale fraction of a row that is still used. Plain choice; no recorded measurement.
-pub(super) const MAX_STALE_FRACTION: f64 = 0.1;
+/// Whether a row of this stale fraction is still used. Plain choice.
+pub(super) fn is_usable(stale_fraction: f64) -> bool {
+    stale_fraction <= 0.1
+}
 
 /// The unshot share to solve to, so that its sum with the error of stale rows stays within
 /// `unshot`.

@@ -5,7 +5,7 @@
 //!      ╱   ╲                  ╱ ╱ │ ╲          in proportion to its area. With C(n, i) for the
 //!     ●     ●       ──►     a  b  c  ●         cost of the tree below n with at most i roots:
 //!    ╱ ╲   ╱ ╲                      ╱ ╲
-//!   a   b c   ●                    d   e       C(n, i) = least of C(left, k) + C(right, i − k),
+//!   a   b c   ●                    d   e       C(n, i) = min of C(left, k) + C(right, i − k),
 //!            ╱ ╲                                         C(n, i − 1)
 //!           d   e                              C(n, 1) = C(n, 8) + area(n)
 //! ```
@@ -17,7 +17,7 @@ use arrayvec::ArrayVec;
 
 use super::sah_tree::SahTree;
 
-/// Boxes in a wide node.
+/// Boxes in a wide node: two vectors of four 32-bit lanes.
 pub(super) const WIDTH: usize = 8;
 
 /// The optimal collapse below each node of a tree.

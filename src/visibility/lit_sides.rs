@@ -70,7 +70,7 @@ impl Scene {
         };
         let groups_repeated =
             (0..repeated.len()).filter(|&t| repeated[t]).map(|t| self.triangles()[t].group);
-        let found = [
+        let warnings = [
             (
                 WarningKind::RepeatedTriangle,
                 groups_repeated.chain(count(|t| t.dropped)).collect(),
@@ -80,7 +80,8 @@ impl Scene {
             (WarningKind::BothSides, count(|t| t.doubled), "reflecting on both"),
         ];
         scene = scene.treated(&treatments);
-        for (kind, groups, done) in found.into_iter().filter(|(_, groups, _)| !groups.is_empty()) {
+        for (kind, groups, done) in warnings.into_iter().filter(|(_, groups, _)| !groups.is_empty())
+        {
             let names = groups.iter().map(|&g| self.groups()[g as usize].as_str());
             scene.warn(Warning::new(kind, groups.len(), done).naming(names));
         }
@@ -152,7 +153,7 @@ struct LitSides<'a> {
     is_lit: Vec<bool>,
     light: &'a SideStatistics<'a>,
     /// Minimum irradiance for a second side, W/m² summed over the channels.
-    least: f64,
+    min_irradiance: f64,
 }
 
 impl<'a> LitSides<'a> {
@@ -182,7 +183,7 @@ impl<'a> LitSides<'a> {
         }
         // Light of that whole amount is an error of 0.2 %, since the measure counts nothing as
         // darker than a twentieth of the mean.
-        LitSides { is_lit, light, least: 1e-4 * flux / lit_area }
+        LitSides { is_lit, light, min_irradiance: 1e-4 * flux / lit_area }
     }
 
     /// Whether light reaches the back of triangle `t` and not its front; where it reaches neither,
@@ -198,7 +199,7 @@ impl<'a> LitSides<'a> {
     }
 
     fn is_bright(&self, side: SideIndex) -> bool {
-        self.light.of_sheet(side).mean() >= self.least
+        self.light.of_sheet(side).mean() >= self.min_irradiance
     }
 }
 

@@ -10,7 +10,7 @@
 //! | [`COINCIDENCE_TOLERANCE`] | 1e-9 | the segment | end of a segment between two points |
 //! | [`SURFACE_LIFT`] | 1e-4 | √area of the patch | near plane of hemicubes on a GPU |
 //! | [`SURFACE_LIFT`] | 1e-4 | √area of the smallest element | gather points |
-//! | [`MIN_LIFT_ULPS`] | 1024 | steps of coordinates | gather points of tiny elements |
+//! | [`min_lift`] | 1024 | steps of coordinates | gather points of tiny elements |
 //! | [`NEAR_OF_LIFT`] | ¼ | lift of the gather point | nearest hit of a gather |
 //! | [`path_contact`] | 1e-9 | the scene's diagonal | paths from points on triangles |
 //! | [`path_contact`] | 64 | steps of coordinates | paths far from the origin |
@@ -38,13 +38,15 @@ pub(crate) const RAY_START: f64 = 1e-6;
 /// smallest element there; distance of the near plane of a hemicube, in that of its patch.
 pub(crate) const SURFACE_LIFT: f64 = 1e-4;
 
-/// Minimum height of a gather point, in steps between 64-bit coordinates of the scene.
-pub(crate) const MIN_LIFT_ULPS: f64 = 1024.0;
-
 /// Minimum distance of hits from a gather point, as a share of its height.
 pub(crate) const NEAR_OF_LIFT: f64 = 0.25;
 
 /// Distance, scene unit, at which surfaces are in contact with the start of a path.
 pub(crate) fn path_contact(scene: &Scene) -> f64 {
     (COINCIDENCE_TOLERANCE * scene.bounds().diagonal()).max(64.0 * scene.coordinate_ulp())
+}
+
+/// Minimum height of a gather point of `scene`, in its unit: steps between 64-bit coordinates.
+pub(crate) fn min_lift(scene: &Scene) -> f64 {
+    1024.0 * scene.coordinate_ulp()
 }

@@ -18,16 +18,13 @@ use crate::geometry::aabb::Aabb;
 
 use super::sah_tree::Aabb32;
 
-/// Longest side of the scene in the hierarchy's own unit.
+/// Longest side of the scene in the hierarchy's own unit. Plain choice: products of three of them
+/// and their inverses are far within the range of 32-bit numbers.
 pub(super) const SCENE_SIZE: f32 = 1e5;
 
 /// Margin of boxes on every side, in the hierarchy's unit: 1e-6 of the scene, several roundings of
 /// a 32-bit coordinate (6e-8 each).
 const BOX_MARGIN: f32 = 1e-6 * SCENE_SIZE;
-
-/// Minimum magnitude of components of directions, so that none has an infinite inverse. Across the
-/// scene the error is below any rounding.
-const MIN_COMPONENT: f32 = 1e-20;
 
 /// Conversion from the scene's unit to the hierarchy's.
 #[derive(Debug)]
@@ -60,7 +57,7 @@ impl LocalUnit {
         LocalUnit { origin: bounds.centre(), scale: f64::from(SCENE_SIZE) / size }
     }
 
-    pub fn place(&self, point: DVec3) -> DVec3 {
+    pub fn to_local(&self, point: DVec3) -> DVec3 {
         (point - self.origin) * self.scale
     }
 
@@ -71,7 +68,7 @@ impl LocalUnit {
 
     /// Bounds of a triangle, with the margin.
     pub fn bounds(&self, corners: [DVec3; 3]) -> Aabb32 {
-        let [a, b, c] = corners.map(|corner| self.place(corner).as_vec3a());
+        let [a, b, c] = corners.map(|corner| self.to_local(corner).as_vec3a());
         Aabb32 { low: a.min(b).min(c) - BOX_MARGIN, high: a.max(b).max(c) + BOX_MARGIN }
     }
 
@@ -81,12 +78,13 @@ impl LocalUnit {
     pub fn ray(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> (Ray32, f64) {
         let length = direction.abs().max_element();
         let unit = (direction * length.recip()).as_vec3a();
-        let small = unit.abs().cmplt(Vec3A::splat(MIN_COMPONENT));
-        let unit = Vec3A::select(small, Vec3A::splat(MIN_COMPONENT).copysign(unit), unit);
+        // No component has an infinite inverse. Across the scene the error is below any rounding.
+        let min = Vec3A::splat(1e-20);
+        let unit = Vec3A::select(unit.abs().cmplt(min), min.copysign(unit), unit);
         let (signs, length) = (unit.is_negative_bitmask() as usize, length * self.scale);
         let start = -rounded_up(-reach.start * length);
         let ray = Ray32 {
-            origin: self.place(from).as_vec3a(),
+            origin: self.to_local(from).as_vec3a(),
             direction: unit,
             inverse: unit.recip(),
             near_sides: [signs & 1, signs >> 1 & 1, signs >> 2],
@@ -119,14 +117,14 @@ impl Ray32 {
         let inverse = splat(self.inverse);
         let [x, y, z] = self.near_sides.map(|side| side & 1);
         let (start, end) = (Vec4::splat(self.start), Vec4::splat(self.end));
-        let (mut met, mut entries) = (0, [[0.0; 4]; 2]);
+        let (mut hits, mut entries) = (0, [[0.0; 4]; 2]);
         for (half, entries) in entries.iter_mut().enumerate() {
             let at = |side, axis: usize| plane(side, axis, half) * inverse[axis];
             let entry = at(x, 0).max(at(y, 1)).max(at(z, 2).max(start));
             let exit = at(x ^ 1, 0).min(at(y ^ 1, 1)).min(at(z ^ 1, 2).min(end));
-            met |= entry.cmple(exit).bitmask() << (4 * half);
+            hits |= entry.cmple(exit).bitmask() << (4 * half);
             *entries = entry.to_array();
         }
-        (met, entries)
+        (hits, entries)
     }
 }

@@ -54,14 +54,15 @@ impl RayScene {
         RayScene::of_some(corners, all)
     }
 
-    /// The scene of the triangles whose indices are in `met`; rays do not hit the others.
-    fn of_some(corners: Vec<[DVec3; 3]>, met: Vec<u32>) -> RayScene {
+    /// The scene of the triangles with these `indices`; rays do not hit the others.
+    fn of_some(corners: Vec<[DVec3; 3]>, indices: Vec<u32>) -> RayScene {
         let unit = LocalUnit::new(&Aabb::from_points(corners.iter().flatten().copied()));
-        let corners = |k: u32| corners[met[k as usize] as usize];
-        let boxes: Vec<Aabb32> = (0..met.len() as u32).map(|k| unit.bounds(corners(k))).collect();
+        let corners = |k: u32| corners[indices[k as usize] as usize];
+        let boxes: Vec<Aabb32> =
+            (0..indices.len() as u32).map(|k| unit.bounds(corners(k))).collect();
         let tree = SahTree::new(&boxes);
-        let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.place(corner)));
-        let plane = |&k: &u32| TrianglePlane::new(met[k as usize], corners(k));
+        let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.to_local(corner)));
+        let plane = |&k: &u32| TrianglePlane::new(indices[k as usize], corners(k));
         let triangles = tree.order.par_iter().map(plane).collect();
         RayScene { bvh, tree, triangles, unit, cut_outs: None }
     }
@@ -97,10 +98,10 @@ impl RayScene {
         RayScene::of_triangles(scene, |t| !scene.is_clear(t))
     }
 
-    fn of_triangles(scene: &Scene, is_met: impl Fn(usize) -> bool) -> RayScene {
+    fn of_triangles(scene: &Scene, is_included: impl Fn(usize) -> bool) -> RayScene {
         let count = scene.triangles().len();
-        let met = (0..count as u32).filter(|&t| is_met(t as usize)).collect();
-        RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), met)
+        let indices = (0..count as u32).filter(|&t| is_included(t as usize)).collect();
+        RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), indices)
             .with_covered_backs(|t| scene.is_back_covered(t))
             .with_cut_outs(CutOuts::new(scene, 0..count))
     }
@@ -170,7 +171,7 @@ impl RayScene {
         best
     }
 
-    /// The same for many `directions` from one point, which is faster: calls `met` with each
+    /// The same for many `directions` from one point, which is faster: calls `visit` with each
     /// direction and its hit, in their order.
     pub fn closest_hits(
         &self,
@@ -178,7 +179,7 @@ impl RayScene {
         directions: impl Iterator<Item = DVec3>,
         start: f64,
         ignored: Option<usize>,
-        mut met: impl FnMut(DVec3, Option<Hit>),
+        mut visit: impl FnMut(DVec3, Option<Hit>),
     ) {
         let mut directions = directions.peekable();
         while directions.peek().is_some() {
@@ -191,7 +192,7 @@ impl RayScene {
                     self.nearest_of_stream(from, &stream, start, ignored, counts)
                 }
             };
-            stream.into_iter().zip(hits).for_each(|(direction, hit)| met(direction, hit));
+            stream.into_iter().zip(hits).for_each(|(direction, hit)| visit(direction, hit));
         }
     }
 
@@ -298,11 +299,11 @@ mod tests {
     /// shared sides, nested ones down to 1e-30, coinciding ones.
     fn hard_triangles() -> Vec<[DVec3; 3]> {
         let mut random = fastrand::Rng::with_seed(1);
-        let mut place = || DVec3::from_array([(); 3].map(|_| random.f64()));
+        let mut random_point = || DVec3::from_array([(); 3].map(|_| random.f64()));
         let mut triangles = vec![];
         for k in 0..60 {
-            let (corner, size) = (place(), 0.1f64.powi(k % 7));
-            let [a, b] = [place(), place()].map(|p| corner + size * (p - 0.5));
+            let (corner, size) = (random_point(), 0.1f64.powi(k % 7));
+            let [a, b] = [random_point(), random_point()].map(|p| corner + size * (p - 0.5));
             triangles.extend([[corner, a, b], [corner, a, a.lerp(b, 1e-7)]]);
         }
         let grid = |x: usize, y: usize| DVec3::new(x as f64 / 6.0, y as f64 / 6.0, 0.5);
@@ -324,7 +325,7 @@ mod tests {
             let at = |p: DVec3| scale * p + offset;
             let rays = RayScene::new(hard.iter().map(|corners| corners.map(at)));
             let mut random = fastrand::Rng::with_seed(2);
-            let mut met = 0;
+            let mut hits = 0;
             for k in 0..200 {
                 let mut on_triangle = |k: usize| {
                     // Corners, points on sides, and points anywhere.
@@ -348,7 +349,7 @@ mod tests {
                     let wanted = brute(&d);
                     assert_eq!((Some(&d), hit), (each.next(), wanted), "{from} {d} {start}");
                     assert_eq!(rays.closest_hit(from, d, start, None), wanted, "{from} {d}");
-                    met += usize::from(hit.is_some());
+                    hits += usize::from(hit.is_some());
                     let end = wanted.map_or(0.5, |hit| hit.distance);
                     for reach in [start..end, start..0.999 * end, end..1.0] {
                         let blocks =
@@ -359,8 +360,8 @@ mod tests {
                 });
                 assert!(each.next().is_none());
             }
-            println!("{met} hits");
-            assert!(met > 10_000);
+            println!("{hits} hits");
+            assert!(hits > 10_000);
         }
     }
 

@@ -55,9 +55,9 @@ impl WideBvh {
                     let node = &self.nodes[node];
                     let (seen, distances) = seen_from(&node.planes, splat(origin));
                     let plane = |side: usize, axis: usize, half: usize| seen[side][axis][half];
-                    let met = |&ray: &u8| rays[usize::from(ray)].meets(plane).0;
-                    let met: ArrayVec<u32, MAX_STREAM> = active.iter().map(met).collect();
-                    let any = met.iter().fold(0, |any, met| any | met);
+                    let hit_boxes = |&ray: &u8| rays[usize::from(ray)].meets(plane).0;
+                    let masks: ArrayVec<u32, MAX_STREAM> = active.iter().map(hit_boxes).collect();
+                    let any = masks.iter().fold(0, |any, mask| any | mask);
                     let mut order: ArrayVec<(u32, usize), WIDTH> = (0..WIDTH)
                         .filter(|&k| any >> k & 1 == 1)
                         .map(|k| (distances.as_flattened()[k].to_bits(), k))
@@ -69,9 +69,9 @@ impl WideBvh {
                         // Without a branch: hits are unpredictable.
                         waiting.resize(begin + active.len(), 0);
                         let mut end = begin;
-                        for (&ray, met) in active.iter().zip(&met) {
+                        for (&ray, mask) in active.iter().zip(&masks) {
                             waiting[end] = ray;
-                            end += (met >> k & 1) as usize;
+                            end += (mask >> k & 1) as usize;
                         }
                         waiting.truncate(end);
                     }
@@ -82,13 +82,13 @@ impl WideBvh {
                     for &ray in &active {
                         let number = usize::from(ray);
                         let ray = &mut rays[number];
-                        let mut met = seen.may_meet(ray);
-                        while met != 0 {
-                            let lane = met.trailing_zeros() as usize;
+                        let mut lanes = seen.may_meet(ray);
+                        while lanes != 0 {
+                            let lane = lanes.trailing_zeros() as usize;
                             if let Some(end) = may_meet(number, pack.first as usize + lane) {
                                 ray.end = end;
                             }
-                            met &= met - 1;
+                            lanes &= lanes - 1;
                         }
                     }
                 }

@@ -17,7 +17,7 @@ use glam::Vec3A;
 /// bits.
 pub(crate) const MAX_LEVELS: u32 = 31;
 
-/// Maximum number of boxes in a leaf.
+/// Maximum number of boxes in a leaf: the triangles of one pack, four 32-bit lanes.
 pub(super) const MAX_LEAF_SIZE: usize = 4;
 
 /// Number of bins along an axis, between which splits are tried. Plain choice; no recorded
@@ -248,26 +248,26 @@ mod tests {
 
     #[test]
     fn crowds_give_shallow_trees() {
-        const N: usize = 100_000;
+        let n = 100_000;
         let at = |low: Vec3A, size: f32| Aabb32 { low, high: low + size };
         let turned = |k: usize| vec3a((k as f32).cos(), (k as f32).sin(), 0.0);
         let fan = |k| Aabb32 { low: Vec3A::ZERO.min(turned(k)), high: Vec3A::ZERO.max(turned(k)) };
         let crowds: [(&str, &dyn Fn(usize) -> Aabb32); 5] = [
             ("the same", &|_| at(Vec3A::ZERO, 1.0)),
-            ("one in the other", &|k| at(Vec3A::ZERO, 1.0 - k as f32 / N as f32)),
+            ("one in the other", &|k| at(Vec3A::ZERO, 1.0 - k as f32 / n as f32)),
             ("halved again and again", &|k| at(Vec3A::ZERO, 0.5f32.powi(k as i32 % 100))),
             ("a fan", &fan),
             ("a row", &|k| at(Vec3A::X * k as f32, 1.0)),
         ];
         for (what, crowd) in crowds {
-            let boxes: Vec<Aabb32> = (0..N).map(crowd).collect();
+            let boxes: Vec<Aabb32> = (0..n).map(crowd).collect();
             let tree = SahTree::new(&boxes);
             let mut there = tree.order.clone();
             there.sort_unstable();
-            assert!(there.iter().copied().eq(0..N as u32), "{what}");
+            assert!(there.iter().copied().eq(0..n as u32), "{what}");
             let leaves = tree.nodes.iter().filter(|node| node.children.is_none());
             assert!(leaves.clone().all(|leaf| leaf.items.len() <= MAX_LEAF_SIZE), "{what}");
-            assert_eq!(leaves.map(|leaf| leaf.items.len()).sum::<usize>(), N, "{what}");
+            assert_eq!(leaves.map(|leaf| leaf.items.len()).sum::<usize>(), n, "{what}");
             let depth = depth(&tree);
             println!("{what}: {depth}");
             assert!(depth <= MAX_LEVELS, "{what}: {depth} levels");

@@ -17,10 +17,6 @@ pub(crate) struct Hit {
     pub front: bool,
 }
 
-/// Barycentric weights down to minus this count as inside, which closes the seam between
-/// neighbours: far above the rounding of the test (some 1e-15), far below visibility.
-pub(super) const BARYCENTRIC_TOLERANCE: f64 = 1e-12;
-
 /// A triangle, prepared for intersection.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePlane {
@@ -67,9 +63,10 @@ impl TrianglePlane {
         let distance = rise / steep;
         let at = direction * distance - to;
         let (u, v) = (at.dot(gradients[0]), at.dot(gradients[1]));
-        let inside = u >= -BARYCENTRIC_TOLERANCE
-            && v >= -BARYCENTRIC_TOLERANCE
-            && u + v <= 1.0 + BARYCENTRIC_TOLERANCE;
+        // Closes the seam between neighbours: far above the rounding of the test (some 1e-15), far
+        // below visibility.
+        let tolerance = 1e-12;
+        let inside = u >= -tolerance && v >= -tolerance && u + v <= 1.0 + tolerance;
         let triangle = triangle as usize;
         inside.then_some(Hit { triangle, distance, u, v, front: facing < 0.0 })
     }

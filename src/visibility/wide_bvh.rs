@@ -117,10 +117,10 @@ impl WideBvh {
                     let seen = |side: usize, axis: usize, half: usize| {
                         node.planes[side][axis][half] - origin[axis]
                     };
-                    let (mut met, entries) = ray.meets(seen);
+                    let (mut hits, entries) = ray.meets(seen);
                     let mut next = || {
-                        let k = met.trailing_zeros() as usize;
-                        met &= met.wrapping_sub(1);
+                        let k = hits.trailing_zeros() as usize;
+                        hits &= hits.wrapping_sub(1);
                         let entry = entries.as_flattened().get(k)?;
                         Some(OpenBox::new(*entry, node.children[k]))
                     };
@@ -135,13 +135,13 @@ impl WideBvh {
                 }
                 ChildKind::Pack(pack) => {
                     let pack = &self.packs[pack];
-                    let mut met = pack.seen_from(ray.origin).may_meet(ray);
-                    while met != 0 {
-                        let lane = met.trailing_zeros() as usize;
+                    let mut hits = pack.seen_from(ray.origin).may_meet(ray);
+                    while hits != 0 {
+                        let lane = hits.trailing_zeros() as usize;
                         if let Some(end) = may_meet(pack.first as usize + lane) {
                             ray.end = end;
                         }
-                        met &= met - 1;
+                        hits &= hits - 1;
                     }
                 }
             }

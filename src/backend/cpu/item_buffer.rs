@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::rasterizer::{Image, Viewport};
 use super::shared::{
-    NOWHERE, cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
+    cell_index, clip_position, from_eye, has_flipped_cell, lattice_corner, lattice_square,
     shows_covered_back,
 };
 use crate::backend::gpu::layout::{BACK, Corner, FaceView, OPEN, TriangleCells};
@@ -55,7 +55,7 @@ impl ItemBuffer<'_> {
         let w = d.dot(Vec3::from(view.forward));
         let mut position = clip_position(x, y, w, view.bottom, view.near);
         if triangle == view.own_triangle || shows_covered_back(self.corners, index, eye, eye_low) {
-            position = NOWHERE;
+            position = Vec4::new(0.0, 0.0, -1.0, 1.0); // beyond the far end: not drawn
         }
         let lattice = lattice_corner(index % 3, self.triangles[triangle as usize].side);
         Varying { position, lattice }

@@ -39,10 +39,6 @@ pub struct RayRows {
     pub(crate) full_share: f64,
 }
 
-/// Minimum number of elements per row of a batch, since the choice of the next shots visits all
-/// elements. With 16 rows for a million of them, that took 27 s of 43.
-const ELEMENTS_PER_ROW: usize = 4096;
-
 impl RayRows {
     /// Default share of the emitted flux from which a patch gets all rays: half of that for
     /// hemicubes, since N² rays are a third of the pixels of a hemicube with N along an edge.
@@ -57,9 +53,10 @@ impl RayRows {
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayRows, Error> {
         HemisphereSamples::new(count)?;
         let (rays, panes) = (RayScene::of_scene(mesh.scene()), Panes::of_scene(mesh.scene()));
-        // Fewer rows if each takes long.
+        // Fewer rows if each takes long; at least one per 4096 elements, since the choice of the
+        // next shots visits all elements: with 16 rows for a million of them, that took 27 s of 43.
         let few = ((1 << 20) / count).clamp(1, 16) as usize;
-        let batch_len = few.max(mesh.element_count() / ELEMENTS_PER_ROW);
+        let batch_len = few.max(mesh.element_count() / 4096);
         Ok(RayRows { rays, panes, count, batch_len, full_share: RayRows::FULL_SHARE })
     }
 

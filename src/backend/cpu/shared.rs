@@ -16,9 +16,6 @@ pub fn shows_covered_back(corners: &[Corner], index: u32, eye: Vec3, eye_low: Ve
     corners[first].back_is_covered != 0 && a.dot((b - a).cross(c - a)) >= 0.0
 }
 
-/// Position of vertices that are not drawn: beyond the far end.
-pub const NOWHERE: Vec4 = Vec4::new(0.0, 0.0, -1.0, 1.0);
-
 /// Clip coordinates of a point with view coordinates `x`, `y` and `w`.
 pub fn clip_position(x: f32, y: f32, w: f32, bottom: f32, near: f32) -> Vec4 {
     Vec4::new(x, (2.0 * y - (1.0 + bottom) * w) / (1.0 - bottom), near, w)

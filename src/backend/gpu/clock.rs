@@ -13,9 +13,6 @@ pub struct Clock {
     seconds_per_tick: f64,
 }
 
-/// Bytes of the three ticks.
-const TICK_BYTES: u64 = 24;
-
 impl Clock {
     /// None for a device without [`wgpu::Features::TIMESTAMP_QUERY`].
     pub fn new(memory: &Memory) -> Result<Option<Clock>, Error> {
@@ -29,9 +26,9 @@ impl Clock {
             ty: wgpu::QueryType::Timestamp,
             count: 3,
         });
-        let resolve = Usage::QUERY_RESOLVE | Usage::COPY_SRC;
-        let resolved = memory.buffer("clock", TICK_BYTES, resolve)?;
-        let staging = memory.buffer("ticks", TICK_BYTES, Usage::MAP_READ | Usage::COPY_DST)?;
+        let bytes = 3 * size_of::<u64>() as u64;
+        let resolved = memory.buffer("clock", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC)?;
+        let staging = memory.buffer("ticks", bytes, Usage::MAP_READ | Usage::COPY_DST)?;
         let seconds_per_tick = f64::from(memory.queue.get_timestamp_period()) * 1e-9;
         Ok(Some(Clock { queries, resolved, staging, seconds_per_tick }))
     }
@@ -40,7 +37,7 @@ impl Clock {
     /// that write them.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..3, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, TICK_BYTES);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, None);
     }
 
     /// Seconds of drawing, and from there to the end of the reduction, in this submission: of an

@@ -23,7 +23,7 @@ pub struct CompactedRows {
     pub settings: wgpu::Buffer,
     /// Capacity in entries.
     pub entries: u32,
-    pub(super) found: wgpu::Buffer,
+    pub(super) list: wgpu::Buffer,
     staging: wgpu::Buffer,
     /// Entries of the next batch that are copied to `staging` in the submission that makes them.
     expected: u64,
@@ -63,7 +63,7 @@ impl CompactedRows {
         Ok(CompactedRows {
             settings: memory.uniform("settings", &[0; size_of::<RowSettings>()])?,
             entries: entries as u32,
-            found: memory.buffer("entries", bytes(entries), storage)?,
+            list: memory.buffer("entries", bytes(entries), storage)?,
             staging: memory.buffer("staging", bytes(entries), Usage::MAP_READ | Usage::COPY_DST)?,
             // 2 MiB.
             expected: 65_536,
@@ -119,11 +119,11 @@ impl CompactedRows {
         let bindings = [
             (1, counts.as_entire_binding()),
             (3, self.settings.as_entire_binding()),
-            (4, self.found.as_entire_binding()),
+            (4, self.list.as_entire_binding()),
         ];
         let layout = pipeline.get_bind_group_layout(1);
         let bindings = bind_group(&gpu.device, "compact rows", &layout, &bindings);
-        encoder.clear_buffer(&self.found, 0, Some(ROW_ENTRIES_HEADER_BYTES));
+        encoder.clear_buffer(&self.list, 0, Some(ROW_ENTRIES_HEADER_BYTES));
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(pipeline);
         pass.set_bind_group(1, &bindings, &[]);
@@ -142,7 +142,7 @@ impl CompactedRows {
         let room = u64::from(settings.entries);
         let copied = self.expected.min(max_entries).min(room).max(1);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
-        encoder.copy_buffer_to_buffer(&self.found, 0, &self.staging, 0, bytes(copied));
+        encoder.copy_buffer_to_buffer(&self.list, 0, &self.staging, 0, bytes(copied));
         SubmittedRows { submission: gpu.queue.submit([encoder.finish()]), copied, room }
     }
 
@@ -154,7 +154,7 @@ impl CompactedRows {
         rows: &SubmittedRows,
         read: impl Fn(&[RowEntry]) -> T,
     ) -> Result<Option<T>, Error> {
-        let Self { found, staging, .. } = self;
+        let Self { list, staging, .. } = self;
         let read_up_to = |submission, copied: u64| {
             let entries = gpu.read_mapped(staging.slice(..bytes(copied)), submission, |bytes| {
                 let count = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
@@ -176,7 +176,7 @@ impl CompactedRows {
         }
         // More than were copied: once more, all of them.
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(found, 0, staging, 0, bytes(count));
+        encoder.copy_buffer_to_buffer(list, 0, staging, 0, bytes(count));
         let submission = gpu.queue.submit([encoder.finish()]);
         Ok(read_up_to(submission, count)?.1)
     }
@@ -217,8 +217,8 @@ mod tests {
             (made, asked)
         };
         let (rows, asked) = make_all(3);
-        let found: Vec<u32> = rows.unwrap().iter().map(|row| row.escaped).collect();
-        assert_eq!(found, patches);
+        let escaped: Vec<u32> = rows.unwrap().iter().map(|row| row.escaped).collect();
+        assert_eq!(escaped, patches);
         assert_eq!(asked, [8, 4, 2, 2, 4, 2, 2, 2]);
         let (rows, asked) = make_all(0);
         assert_eq!(rows.unwrap_err().kind(), ErrorKind::Memory);

@@ -3,7 +3,7 @@
 //! ```text
 //! with_error_scopes(work)      push scopes → work() → pop scopes → an error, or work's result
 //! retry_with_smaller_batches   make(batch), make(batch/2), … until it fits in memory
-//! wait                         poll until all submitted work is done; at most DEVICE_TIMEOUT
+//! wait                         poll until all submitted work is done; at most 120 s
 //! ```
 //!
 //! A lost device stays lost: the reason is recorded once, and every later use returns it.
@@ -36,10 +36,6 @@ pub struct Gpu {
     budget: Arc<MemoryBudget>,
     pub(super) tracing: Arc<Tracing>,
 }
-
-/// Maximum time of a batch before the device counts as lost. A batch takes a fraction of a second,
-/// on slow devices seconds; watchdogs of drivers act earlier. Plain choice.
-const DEVICE_TIMEOUT: Duration = Duration::from_secs(120);
 
 impl Gpu {
     /// Opens an adapter whose name contains `name` in any case, or the best one: discrete before
@@ -223,8 +219,11 @@ impl Gpu {
 
     /// Waits until this submission and all before it are done; with `None`, until all are.
     pub(super) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<(), Error> {
+        // A batch takes a fraction of a second, on slow devices seconds; watchdogs of drivers act
+        // earlier. Plain choice.
+        let seconds = 120;
         let poll = || {
-            let timeout = Some(DEVICE_TIMEOUT);
+            let timeout = Some(Duration::from_secs(seconds));
             let submission_index = submission.clone();
             self.device.poll(wgpu::PollType::Wait { submission_index, timeout })
         };
@@ -235,7 +234,7 @@ impl Gpu {
         let found = match waited {
             Ok(Ok(_)) => return Ok(()),
             Ok(Err(wgpu::PollError::Timeout)) => {
-                format!("no answer for {} s", DEVICE_TIMEOUT.as_secs())
+                format!("no answer for {seconds} s")
             }
             Ok(Err(e)) => {
                 // A device that was lost before the submission reports it when it is polled again.

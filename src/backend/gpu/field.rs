@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::layout::{ELEMENTS_A_LINE, INNER};
+use super::layout::{INNER, TEXELS_PER_LINE};
 use super::limits::GpuLimits;
 use super::memory::Memory;
 use crate::error::{Error, ErrorKind};
@@ -25,7 +25,7 @@ pub struct FieldBuffers {
     /// Lattices, then nodes: [`INNER`] plus the first of four children, or an element.
     pub quadtrees: wgpu::Buffer,
     /// Per element, the reflected radiosity at its three corners, per channel, in three lines, each
-    /// with a channel of its reflectance; [`ELEMENTS_A_LINE`] elements side by side.
+    /// with a channel of its reflectance; [`TEXELS_PER_LINE`] elements side by side.
     pub elements: wgpu::TextureView,
     _memory: Memory,
 }
@@ -39,10 +39,10 @@ impl FieldBuffers {
     ) -> Result<FieldBuffers, Error> {
         let quadtrees = quadtrees(field.mesh);
         let texels = element_texels(field, radiance_unit);
-        let lines = field.corners.len().div_ceil(ELEMENTS_A_LINE as usize).max(1);
+        let lines = field.corners.len().div_ceil(TEXELS_PER_LINE as usize).max(1);
         Ok(FieldBuffers {
             quadtrees: memory.storage("quadtrees", bytemuck::cast_slice(&quadtrees))?,
-            elements: memory.texels("elements", &texels, [ELEMENTS_A_LINE, 3 * lines as u32])?,
+            elements: memory.texels("elements", &texels, [TEXELS_PER_LINE, 3 * lines as u32])?,
             _memory: memory,
         })
     }
@@ -50,13 +50,13 @@ impl FieldBuffers {
 
 /// A hash that identifies a field of a scene: of all uploaded data.
 pub fn key(field: &RadiosityField) -> u64 {
-    /// Bytes are hashed in parts of this many items, on all cores.
-    const PART: usize = 1 << 16;
+    // Items are hashed in parts, on all cores.
+    let len = 1 << 16;
     let mesh = field.mesh;
-    let values = field.reflected.par_chunks(PART).map(|c| xxh3_64(bytemuck::cast_slice(c)));
-    let corners = field.corners.par_chunks(PART).map(|c| xxh3_64(bytemuck::cast_slice(c)));
+    let values = field.reflected.par_chunks(len).map(|c| xxh3_64(bytemuck::cast_slice(c)));
+    let corners = field.corners.par_chunks(len).map(|c| xxh3_64(bytemuck::cast_slice(c)));
     let all: Vec<usize> = (0..mesh.element_count()).collect();
-    let elements = all.par_chunks(PART).map(|part| {
+    let elements = all.par_chunks(len).map(|part| {
         let nodes: Vec<u32> = part.iter().map(|&e| mesh.element(e).0).collect();
         xxh3_64(bytemuck::cast_slice(&nodes))
     });
@@ -71,7 +71,7 @@ pub fn element_texels(field: &RadiosityField, radiance_unit: f64) -> Vec<[f32; 4
         let radiosity = reflected[k as usize] * relative / radiance_unit;
         radiosity.as_vec3().extend(reflectance as f32).to_array()
     };
-    let line = ELEMENTS_A_LINE as usize;
+    let line = TEXELS_PER_LINE as usize;
     let mut texels = vec![[0f32; 4]; corners.len().div_ceil(line).max(1) * 3 * line];
     let lines = texels.par_chunks_mut(3 * line).zip(corners.par_chunks(line)).enumerate();
     lines.for_each(|(first, (texels, corners))| {
@@ -149,7 +149,7 @@ pub fn check(limits: GpuLimits, field: &RadiosityField, triangles: usize) -> Res
     }
     // There are fewer than three nodes per element: less than 4/3 in trees and one in lattices;
     // plus two words per triangle, which has at least one element.
-    let max = u64::from(limits.texture / 3 * ELEMENTS_A_LINE).min(limits.buffer / 20);
+    let max = u64::from(limits.texture / 3 * TEXELS_PER_LINE).min(limits.buffer / 20);
     if elements as u64 > max {
         return setting(format!("{elements} elements"), format!("this device holds {max}"));
     }

@@ -17,7 +17,6 @@ use super::layout::{Corner, FaceView, TriangleCells};
 use super::memory::Memory;
 use super::pipeline;
 use super::render_targets::RenderTargets;
-use super::shaders::ITEM_BUFFER_WGSL;
 use crate::error::Error;
 use crate::hemicube::Face;
 
@@ -52,7 +51,7 @@ impl ItemBuffer {
         let bytes = u64::from(batch) * 5 * size_of::<FaceView>() as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let views = memory.buffer("views", bytes, usage)?;
-        let module = pipeline::shader(device, "item_buffer.wgsl", ITEM_BUFFER_WGSL);
+        let module = pipeline::shader(device, "item_buffer.wgsl");
         let pipeline = pipeline::draw(device, &module, ItemBuffer::FORMAT.into());
         let resources = [(0, &corners), (1, &triangles), (2, &views)]
             .map(|(binding, buffer)| (binding, buffer.as_entire_binding()));

@@ -1,6 +1,6 @@
 //! Maps the item of a pixel to the slot of the row that it counts for.
 
-use super::layout::{BACK, FIRST_CELL, FIRST_ELEMENT, OPEN, TriangleCells};
+use super::layout::{BACK, FIRST_FRONT, OPEN, TriangleCells};
 use crate::mesh::Mesh;
 
 /// Every triangle as a lattice of the finest cells in its quadtree. A pixel's item is OPEN, BACK or
@@ -16,7 +16,7 @@ impl ItemTable {
     /// Number of items for `mesh`; known before the table is made.
     pub fn count(mesh: &Mesh) -> u64 {
         let triangles = 0..mesh.scene().triangles().len();
-        u64::from(FIRST_CELL) + triangles.map(|t| 1 << (2 * mesh.depth(t))).sum::<u64>()
+        u64::from(FIRST_FRONT) + triangles.map(|t| 1 << (2 * mesh.depth(t))).sum::<u64>()
     }
 
     /// The table for `mesh`.
@@ -30,7 +30,7 @@ impl ItemTable {
             for e in mesh.elements_of(mesh.root(t)) {
                 let cell = mesh.cell(mesh.element(e));
                 cell.for_each_descendant(depth, &mut |c| {
-                    slots[first + c.index() as usize] = FIRST_ELEMENT + e as u32;
+                    slots[first + c.index() as usize] = FIRST_FRONT + e as u32;
                 });
             }
         }

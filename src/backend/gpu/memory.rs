@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytemuck::Pod;
 
 use super::error::device_error;
-use super::layout::TEXELS_A_LINE;
+use super::layout::TEXELS_PER_LINE;
 use crate::error::{Error, ErrorKind};
 
 /// Total byte limit for all users of a device, and bytes allocated.
@@ -124,7 +124,7 @@ impl Memory {
         }))
     }
 
-    /// A texture that shaders read as an array of any length, [`TEXELS_A_LINE`] per line.
+    /// A texture that shaders read as an array of any length, [`TEXELS_PER_LINE`] per line.
     pub fn lines(&self, label: &str, texels: &[[f32; 4]]) -> Result<wgpu::TextureView, Error> {
         let (padded, size) = padded_to_lines(texels);
         self.texels(label, &padded, size)
@@ -181,7 +181,7 @@ impl Memory {
 
 /// Texels padded to whole lines, at least one, and the number of columns and lines.
 fn padded_to_lines<T: Pod>(texels: &[T]) -> (Vec<T>, [u32; 2]) {
-    let line = TEXELS_A_LINE as usize;
+    let line = TEXELS_PER_LINE as usize;
     let width = texels.len().clamp(1, line);
     let height = texels.len().div_ceil(line).max(1);
     let mut padded = texels.to_vec();

@@ -1,9 +1,12 @@
 //! Shader modules, pipelines and bind groups for all passes.
 
-/// The module of a WGSL source.
-pub fn shader(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderModule {
+use super::shaders::SHADERS;
+
+/// The module of the shader in this `file` of [`SHADERS`].
+pub fn shader(device: &wgpu::Device, file: &str) -> wgpu::ShaderModule {
+    let source = SHADERS.iter().find(|(name, _)| *name == file).expect("a file of SHADERS").1;
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
+        label: Some(file),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     })
 }

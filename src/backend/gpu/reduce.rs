@@ -9,11 +9,10 @@
 //! A thread adds up a strip of [`STRIP`] pixels of one column; the sums are added by integer
 //! atomics, so that their order does not matter. The twin on the CPU is `backend/cpu/reduce.rs`.
 
-use super::layout::{Reduction, STRIP, WORKGROUP};
+use super::layout::{LANES, Reduction, STRIP};
 use super::memory::Memory;
 use super::pipeline;
 use super::render_targets::RenderTargets;
-use super::shaders::REDUCE_WGSL;
 use crate::error::Error;
 use crate::hemicube;
 
@@ -57,7 +56,7 @@ impl Reduce {
         let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
         // Zero initially and after each batch.
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
-        let module = pipeline::shader(device, "reduce.wgsl", REDUCE_WGSL);
+        let module = pipeline::shader(device, "reduce.wgsl");
         let pipeline = pipeline::compute(device, &module, "reduce");
         let item_bytes = Reduce::items_bytes(resolution) * u64::from(hemicubes);
         let items = memory.buffer("items", item_bytes, usage)?;
@@ -99,7 +98,7 @@ impl Reduce {
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bindings, &[]);
-        pass.dispatch_workgroups(pixels.div_ceil(WORKGROUP), (3 * pixels).div_ceil(STRIP), count);
+        pass.dispatch_workgroups(pixels.div_ceil(LANES), (3 * pixels).div_ceil(STRIP), count);
     }
 }
 

@@ -21,7 +21,7 @@ use super::draw_list::DrawList;
 use super::error::check_hemicubes_see;
 use super::item_buffer::{ItemBuffer, View};
 use super::item_table::ItemTable;
-use super::layout::{BACK, Corner, FIRST_ELEMENT, FaceView, OPEN, RowEntry, RowSettings};
+use super::layout::{BACK, Corner, FIRST_FRONT, FaceView, OPEN, RowEntry, RowSettings};
 use super::limits::GpuLimits;
 use super::memory::Memory;
 use super::reduce::{BatchSize, Reduce};
@@ -228,7 +228,7 @@ impl HemicubeRows {
 
 /// Words of a dense row over `mesh`.
 fn slots(mesh: &Mesh) -> u32 {
-    mesh.element_count() as u32 + FIRST_ELEMENT
+    mesh.element_count() as u32 + FIRST_FRONT
 }
 
 /// Bytes of a dense row of this number of words.
@@ -301,8 +301,8 @@ fn rows_of(entries: &[RowEntry], patches: &[NodeId]) -> Result<Vec<Row>, String>
 
 /// The row of `patch` by its entries, if these sum to 1; else an error message.
 fn row_of(entries: &[RowEntry], patch: NodeId) -> Result<Row, String> {
-    let (lost, seen) = entries.split_at(entries.partition_point(|e| e.slot < FIRST_ELEMENT));
-    let entry = |e: &RowEntry| Entry { element: e.slot - FIRST_ELEMENT, share: e.count };
+    let (lost, seen) = entries.split_at(entries.partition_point(|e| e.slot < FIRST_FRONT));
+    let entry = |e: &RowEntry| Entry { element: e.slot - FIRST_FRONT, share: e.count };
     let share = |slot: u32| lost.iter().find(|e| e.slot == slot).map_or(0, |e| e.count);
     let row = Row {
         entries: seen.iter().map(entry).collect(),

@@ -1,27 +1,25 @@
 //! Sources of the shaders; shared parts are in `shaders/shared`.
 
-/// Shaders begin with their shared parts.
+use super::layout::constants_wgsl;
+
+/// Name and source of a shader: it begins with the shared constants and its shared parts.
 macro_rules! shader {
-    ($file:literal, $($shared:literal),*) => {
-        concat!(
-            $(include_str!(concat!("../../../shaders/shared/", $shared)),)*
-            include_str!(concat!("../../../shaders/", $file)),
+    ($file:literal $(, $shared:literal)*) => {
+        (
+            $file,
+            concat!(
+                constants_wgsl!(),
+                $(include_str!(concat!("../../../shaders/shared/", $shared)),)*
+                include_str!(concat!("../../../shaders/", $file)),
+            ),
         )
     };
 }
 
-pub const ITEM_BUFFER_WGSL: &str = shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl");
-pub const REDUCE_WGSL: &str = include_str!("../../../shaders/reduce.wgsl");
-
 /// Ray-casting shaders begin with ray–scene intersection.
 macro_rules! ray_shader {
     ($file:literal $(, $shared:literal)*) => {
-        shader!(
-            $file,
-            "trace.wgsl",
-            "lights.wgsl"
-            $(, $shared)*
-        )
+        shader!($file, "trace.wgsl", "lights.wgsl" $(, $shared)*)
     };
 }
 
@@ -42,12 +40,15 @@ macro_rules! field_shader {
     };
 }
 
-pub const RANK_LIGHTS_WGSL: &str = ray_shader!("rank_lights.wgsl", "gather_state.wgsl");
-pub const HEMISPHERE_RAYS_WGSL: &str = field_shader!("hemisphere_rays.wgsl");
-pub const NEAR_PATHS_WGSL: &str = field_shader!("near_paths.wgsl");
-pub const LIGHT_RAYS_WGSL: &str =
-    ray_shader!("light_rays.wgsl", "sky.wgsl", "gather_state.wgsl", "work_list.wgsl");
-pub const SETTLE_WGSL: &str = ray_shader!("settle.wgsl", "gather_state.wgsl", "near_field.wgsl");
-pub const ROW_RAYS_WGSL: &str =
-    ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl", "row_settings.wgsl");
-pub const COMPACT_ROWS_WGSL: &str = shader!("compact_rows.wgsl", "row_settings.wgsl");
+/// All shaders: file in `shaders/`, and source.
+pub const SHADERS: [(&str, &str); 9] = [
+    shader!("item_buffer.wgsl", "corner.wgsl", "lattice.wgsl"),
+    shader!("reduce.wgsl"),
+    ray_shader!("rank_lights.wgsl", "gather_state.wgsl"),
+    field_shader!("hemisphere_rays.wgsl"),
+    field_shader!("near_paths.wgsl"),
+    ray_shader!("light_rays.wgsl", "sky.wgsl", "gather_state.wgsl", "work_list.wgsl"),
+    ray_shader!("settle.wgsl", "gather_state.wgsl", "near_field.wgsl"),
+    ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl", "row_settings.wgsl"),
+    shader!("compact_rows.wgsl", "row_settings.wgsl"),
+];

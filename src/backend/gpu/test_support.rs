@@ -46,7 +46,7 @@ pub fn textured_scene() -> Mesh {
         let exitance = Some(map(material.exitance)).filter(|_| material.exitance != Rgb::ZERO);
         (m, MaterialTextures { reflectance: Some(map(Rgb::splat(0.9))), exitance, mask: None })
     };
-    let place = |t: usize| {
+    let coordinates = |t: usize| {
         let turned = DVec2::from_angle(t as f64);
         [DVec2::ZERO, DVec2::X, DVec2::Y].map(|corner| turned.rotate(corner))
     };
@@ -55,7 +55,7 @@ pub fn textured_scene() -> Mesh {
         plain.triangles().to_vec(),
         plain.groups().to_vec(),
         plain.materials().to_vec(),
-        (0..plain.triangles().len()).map(place).collect(),
+        (0..plain.triangles().len()).map(coordinates).collect(),
         (0..).zip(plain.materials()).map(textures).collect(),
     );
     mesh.with_scene(scene.unwrap()).unwrap()
@@ -226,12 +226,14 @@ fn sheets_with_holes() -> Mesh {
     };
     let of_materials = [(1, mask(false, DVec2::new(2.3, 1.4))), (2, mask(true, DVec2::splat(1.2)))];
     let (low, high) = ([DVec2::ZERO, DVec2::X, DVec2::ONE], [DVec2::ZERO, DVec2::ONE, DVec2::Y]);
-    let places = (0..parts.triangles.len()).map(|t| if t % 2 == 0 { low } else { high }).collect();
+    let coordinates =
+        (0..parts.triangles.len()).map(|t| if t % 2 == 0 { low } else { high }).collect();
     let Parts { positions, triangles, materials } = parts;
     let groups = vec!["all".into()];
     let textures = of_materials.into_iter().collect();
     let scene =
-        Scene::with_textures(positions, triangles, groups, materials, places, textures).unwrap();
+        Scene::with_textures(positions, triangles, groups, materials, coordinates, textures)
+            .unwrap();
     Mesh::new(scene.with_sky(Sky::uniform(Rgb::new(0.2, 0.1, 0.3))).unwrap(), 0.7).unwrap()
 }
 
@@ -352,9 +354,9 @@ pub fn narrow_gap() -> Mesh {
 }
 
 /// `count` points just above the elements of `mesh`, distributed over all of these.
-pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
+pub fn gather_points(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
     let random = |k: usize| unit_interval(split_mix64_nth(k as u64));
-    let place = |k: usize| {
+    let point = |k: usize| {
         let node = mesh.element(k * mesh.element_count() / count);
         let [a, b, c] = mesh.corners(node);
         let (u, v) = (random(2 * k), random(2 * k + 1));
@@ -363,7 +365,7 @@ pub fn places(mesh: &Mesh, count: usize) -> Vec<GatherPoint> {
         let normal = mesh.normal(node);
         GatherPoint { position: on + lift * normal, normal, near: 0.25 * lift }
     };
-    (0..count).map(place).collect()
+    (0..count).map(point).collect()
 }
 
 /// Points on the sides of all triangles of `mesh`'s scene, `count` on each.
@@ -478,10 +480,10 @@ pub fn picture(width: usize, device: &[char], twin: &[char], wrong: &[bool]) -> 
 
 /// A symbol for an item: `.` for nothing, `#` for a back, then digits and letters, repeatedly.
 pub fn symbol(item: u32) -> char {
-    const CELLS: &[u8; 62] = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+    let cells = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
     match item {
         super::layout::OPEN => '.',
         super::layout::BACK => '#',
-        cell => CELLS[(cell - super::layout::FIRST_CELL) as usize % 62].into(),
+        cell => cells[(cell - super::layout::FIRST_FRONT) as usize % 62].into(),
     }
 }

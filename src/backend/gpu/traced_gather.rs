@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::field::{self, FieldBuffers};
-use super::layout::{GatherSettings, Sample, TEXELS_A_LINE, TracedPoint, WORK_HEADER_BYTES};
+use super::layout::{GatherSettings, Sample, TEXELS_PER_LINE, TracedPoint, WORK_HEADER_BYTES};
 use super::limits::MAX_POINTS;
 use super::memory::Memory;
 use super::pipeline::bind_group;
@@ -475,11 +475,11 @@ impl BoundPass {
 
 /// Checks that a device supports the width of textures that are read as arrays.
 pub fn check_textures(texture: u32) -> Result<(), Error> {
-    if texture >= TEXELS_A_LINE {
+    if texture >= TEXELS_PER_LINE {
         return Ok(());
     }
     let found = format!("textures of {texture} pixels along an edge");
-    let remedy = format!("rays on the device take {TEXELS_A_LINE}");
+    let remedy = format!("rays on the device take {TEXELS_PER_LINE}");
     Err(Error::new(ErrorKind::Setting, "graphics device", found, remedy))
 }
 

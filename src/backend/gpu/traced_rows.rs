@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::compacted_rows::{CompactedRows, by_row};
 use super::device::Gpu;
 use super::field::quadtrees;
-use super::layout::{BACK, FIRST_ELEMENT, OPEN, RowEntry, RowSettings, TracedPatch};
+use super::layout::{BACK, FIRST_FRONT, OPEN, RowEntry, RowSettings, TracedPatch};
 use super::memory::Memory;
 use super::pipeline::bind_group;
 use super::traced_gather::check_textures;
@@ -69,7 +69,7 @@ impl TracedRows {
         let lights = Lights::new(mesh.shared_scene());
         let scene = gpu.traced_scene(&mesh.shared_scene(), &lights)?;
         let has_panes = mesh.scene().clear_panes().is_some();
-        let slots = mesh.element_count() as u32 + FIRST_ELEMENT;
+        let slots = mesh.element_count() as u32 + FIRST_FRONT;
         let row_bytes = u64::from(slots) * if has_panes { 16 } else { 4 };
         // Any WebGPU device binds 128 MiB.
         let max_bytes = gpu.limits().buffer.min(128 << 20);
@@ -210,7 +210,7 @@ fn rows_of(
 /// The row by its entries, slots ascending.
 fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
     // OPEN and BACK are the first slots, and as items the last and the one before it.
-    let lost = entries.partition_point(|e| e.slot < FIRST_ELEMENT);
+    let lost = entries.partition_point(|e| e.slot < FIRST_FRONT);
     let items = entries[lost..].iter().chain(entries[..lost].iter().rev());
     let row = row_of_counts(items.map(|e| (item(e.slot), e.count)), rays as usize);
     let unit = passed_unit(rays);
@@ -227,7 +227,7 @@ fn row_of(entries: &[RowEntry], rays: u32, has_panes: bool) -> Row {
         let entry = entries.iter().find(|e| item(e.slot) == item_of);
         Row::passed(entry.map_or(Rgb::ONE, mean))
     };
-    let elements = entries.iter().filter(|e| e.slot >= FIRST_ELEMENT);
+    let elements = entries.iter().filter(|e| e.slot >= FIRST_FRONT);
     let passed = elements.map(|e| Row::passed(mean(e)));
     let passed = passed.chain([of(cpu::OPEN), of(cpu::BACK)]).collect();
     Row { passed, ..row }
@@ -243,7 +243,7 @@ fn item(slot: u32) -> u32 {
     match slot {
         OPEN => cpu::OPEN,
         BACK => cpu::BACK,
-        element => element - FIRST_ELEMENT,
+        element => element - FIRST_FRONT,
     }
 }
 

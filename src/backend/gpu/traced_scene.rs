@@ -14,7 +14,7 @@ use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, Vec3A};
 
 use super::layout::{
-    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, ROW_OF_FLAGS, TEXELS_A_LINE, TraceNode,
+    BACK_IS_COVERED, HAS_HOLES, LEAF, Lamp, NOTHING, ROW_OF_FLAGS, TEXELS_PER_LINE, TraceNode,
     TracedLight, TracedSceneInfo, TracedTriangle,
 };
 use super::memory::Memory;
@@ -35,7 +35,7 @@ pub struct TracedScene {
     pub nodes: wgpu::Buffer,
     pub triangles: wgpu::Buffer,
     pub info: wgpu::Buffer,
-    pub mask_places: wgpu::TextureView,
+    pub mask_coordinates: wgpu::TextureView,
     pub masks: wgpu::TextureView,
     pub lights: wgpu::Buffer,
     pub lamps: wgpu::Buffer,
@@ -51,7 +51,7 @@ pub struct TracedArrays {
     pub nodes: Vec<TraceNode>,
     pub triangles: Vec<TracedTriangle>,
     pub info: TracedSceneInfo,
-    pub mask_places: Vec<[f32; 4]>,
+    pub mask_coordinates: Vec<[f32; 4]>,
     pub masks: Vec<u32>,
     pub lights: Vec<TracedLight>,
     pub lamps: Vec<Lamp>,
@@ -69,7 +69,7 @@ impl TracedScene {
             nodes: memory.storage("hierarchy", bytemuck::cast_slice(&arrays.nodes))?,
             triangles: memory.storage("triangles", bytemuck::cast_slice(&arrays.triangles))?,
             info: memory.uniform("scene", bytemuck::bytes_of(&arrays.info))?,
-            mask_places: memory.lines("places of masks", &arrays.mask_places)?,
+            mask_coordinates: memory.lines("coordinates of masks", &arrays.mask_coordinates)?,
             masks: memory.words("masks", &arrays.masks)?,
             lights: memory.storage("lights", bytemuck::cast_slice(&arrays.lights))?,
             lamps: memory.storage("lamps", bytemuck::cast_slice(&arrays.lamps))?,
@@ -84,7 +84,7 @@ impl TracedScene {
             (0, self.nodes.as_entire_binding()),
             (1, self.triangles.as_entire_binding()),
             (2, self.info.as_entire_binding()),
-            (3, wgpu::BindingResource::TextureView(&self.mask_places)),
+            (3, wgpu::BindingResource::TextureView(&self.mask_coordinates)),
             (4, wgpu::BindingResource::TextureView(&self.masks)),
         ]
     }
@@ -105,7 +105,7 @@ impl TracedArrays {
             nodes: vec![],
             triangles: Vec::with_capacity(scene.triangles().len()),
             info: TracedSceneInfo { panes: NOTHING, ..Zeroable::zeroed() },
-            mask_places: vec![[0.0; 4]],
+            mask_coordinates: vec![[0.0; 4]],
             masks: vec![0],
             lights: vec![],
             lamps: vec![],
@@ -183,12 +183,14 @@ impl TracedArrays {
             }
         }
         if nodes.is_empty() {
-            // The root is a leaf, or there are no triangles.
+            // The root is a leaf, or there are no triangles; the other child is an empty leaf in a
+            // box that no ray hits: a point beyond `FAR`.
+            let none = || Child { bounds: [[1e31; 3]; 2], node: LEAF };
             let root = match tree.order.is_empty() {
-                true => Child::NONE,
+                true => none(),
                 false => Child { bounds: bounds(0), node: child(0) },
             };
-            nodes.push(pair([root, Child::NONE]));
+            nodes.push(pair([root, none()]));
         }
         self.nodes.extend(nodes);
     }
@@ -287,7 +289,7 @@ impl TracedArrays {
             self.masks.extend(solid.chunks(32).map(word));
         }
         let count = scene.triangles().len();
-        self.mask_places = vec![[0.0; 4]; 3 * count];
+        self.mask_coordinates = vec![[0.0; 4]; 3 * count];
         let mut has_holes = vec![false; count];
         for t in 0..count {
             let Some(mask) = scene.mask(t) else { continue };
@@ -303,9 +305,9 @@ impl TracedArrays {
                 if mask.clamped { DVec2::ZERO } else { (corners[0] / whole).floor() * whole };
             let [a, b, c] = corners.map(|place| (place - tile).as_vec2());
             let word = first_word[&scene.triangles()[t].material] as f32;
-            self.mask_places[3 * t] = [a.x, a.y, b.x, b.y];
-            self.mask_places[3 * t + 1] = [c.x, c.y, word, size[0] as f32];
-            self.mask_places[3 * t + 2] = [size[1] as f32, mask.clamped.into(), 0.0, 0.0];
+            self.mask_coordinates[3 * t] = [a.x, a.y, b.x, b.y];
+            self.mask_coordinates[3 * t + 1] = [c.x, c.y, word, size[0] as f32];
+            self.mask_coordinates[3 * t + 2] = [size[1] as f32, mask.clamped.into(), 0.0, 0.0];
             has_holes[t] = true;
         }
         has_holes
@@ -316,11 +318,6 @@ impl TracedArrays {
 struct Child {
     bounds: [[f32; 3]; 2],
     node: u32,
-}
-
-impl Child {
-    /// An empty leaf in a box that no ray hits: a point beyond the farthest end.
-    const NONE: Child = Child { bounds: [[1e31; 3]; 2], node: LEAF };
 }
 
 fn pair([a, b]: [Child; 2]) -> TraceNode {
@@ -351,15 +348,12 @@ fn sky_texels(map: &SkyMap, radiance_unit: f64) -> Vec<[f32; 4]> {
     map.pieces().iter().map(texel).collect()
 }
 
-/// Margin of boxes, in units of the scene's size: four roundings of a coordinate, which is at most
-/// half of that. The margin of the hierarchy itself is in its own unit.
-const BOX_MARGIN: f32 = 2.4e-7;
-
 impl SplitFloat {
-    /// A box for rays, with the margin.
+    /// A box for rays, with a margin in units of the scene's size: four roundings of a coordinate,
+    /// which is at most half of that. The margin of the hierarchy itself is in its own unit.
     fn widened(&self, [low, high]: [DVec3; 2]) -> [[f32; 3]; 2] {
         let [low, high] = [low, high].map(|p| Vec3A::from_array(self.parts(p)[0]));
-        [(low - BOX_MARGIN).to_array(), (high + BOX_MARGIN).to_array()]
+        [(low - 2.4e-7).to_array(), (high + 2.4e-7).to_array()]
     }
 
     /// Triangle `t` of `scene`, which belongs to this light.
@@ -381,4 +375,4 @@ impl SplitFloat {
     }
 }
 
-const _: () = assert!(NO_LIGHT == u32::MAX && TEXELS_A_LINE.is_power_of_two());
+const _: () = assert!(NO_LIGHT == u32::MAX && TEXELS_PER_LINE.is_power_of_two());

@@ -6,10 +6,6 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use super::field::{self, FieldBuffers};
 use super::memory::Memory;
 use super::pipeline;
-use super::shaders::{
-    COMPACT_ROWS_WGSL, HEMISPHERE_RAYS_WGSL, LIGHT_RAYS_WGSL, NEAR_PATHS_WGSL, RANK_LIGHTS_WGSL,
-    ROW_RAYS_WGSL, SETTLE_WGSL,
-};
 use super::slots::Slots;
 use super::traced_scene::TracedScene;
 use crate::error::{Error, ErrorKind};
@@ -50,15 +46,15 @@ pub struct GatherPipelines {
 
 impl GatherPipelines {
     fn new(device: &wgpu::Device) -> GatherPipelines {
-        let module = |label, source| pipeline::shader(device, label, source);
-        let [rank, hemisphere, near, lights, settle] = [
-            ("rank_lights.wgsl", RANK_LIGHTS_WGSL),
-            ("hemisphere_rays.wgsl", HEMISPHERE_RAYS_WGSL),
-            ("near_paths.wgsl", NEAR_PATHS_WGSL),
-            ("light_rays.wgsl", LIGHT_RAYS_WGSL),
-            ("settle.wgsl", SETTLE_WGSL),
-        ]
-        .map(|(label, source)| module(label, source));
+        let files = [
+            "rank_lights.wgsl",
+            "hemisphere_rays.wgsl",
+            "near_paths.wgsl",
+            "light_rays.wgsl",
+            "settle.wgsl",
+        ];
+        let [rank, hemisphere, near, lights, settle] =
+            files.map(|file| pipeline::shader(device, file));
         // Drivers take up to a second for one, on one core.
         let entries = [
             (&rank, "rank_lights"),
@@ -111,8 +107,8 @@ pub struct RowPipelines {
 
 impl RowPipelines {
     fn new(device: &wgpu::Device) -> RowPipelines {
-        let rays = pipeline::shader(device, "row_rays.wgsl", ROW_RAYS_WGSL);
-        let compact = pipeline::shader(device, "compact_rows.wgsl", COMPACT_ROWS_WGSL);
+        let rays = pipeline::shader(device, "row_rays.wgsl");
+        let compact = pipeline::shader(device, "compact_rows.wgsl");
         RowPipelines {
             row_rays: pipeline::compute(device, &rays, "row_rays"),
             compact_rows: pipeline::compute(device, &compact, "compact_rows"),

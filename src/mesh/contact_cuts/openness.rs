@@ -17,11 +17,9 @@ use crate::scene::Scene;
 use crate::visibility::buried;
 use crate::visibility::ray_scene::RayScene;
 
-/// Number of rays that test whether a point is inside a solid.
+/// Number of rays that test whether a point is inside a solid: below 200, one front among them
+/// shows that it is not ([`buried::INSIDE`]). Plain choice.
 const OPENNESS_RAYS: u32 = 128;
-
-/// Rays per batch, a divisor of [`OPENNESS_RAYS`].
-const RAYS_AT_ONCE: u32 = 4;
 
 /// Tests on which sides of a contact segment light may fall.
 pub(super) struct Openness {
@@ -76,17 +74,18 @@ impl Openness {
     }
 
     fn is_open(&self, point: DVec3, normal: DVec3) -> bool {
-        // Most points are in the open, which the first few rays show.
-        let most = buried::INSIDE * f64::from(OPENNESS_RAYS);
+        // Most points are in the open, which the first 4 rays show; 4 divides the number of rays.
+        let batch = 4;
+        let max_backs = buried::INSIDE * f64::from(OPENNESS_RAYS);
         let (mut cast, mut backs) = (0, 0);
-        while f64::from(backs) < most && f64::from(backs + OPENNESS_RAYS - cast) >= most {
-            let directions = self.directions.directions_in(cast..cast + RAYS_AT_ONCE, normal, 0.5);
+        while f64::from(backs) < max_backs && f64::from(backs + OPENNESS_RAYS - cast) >= max_backs {
+            let directions = self.directions.directions_in(cast..cast + batch, normal, 0.5);
             self.rays.closest_hits(point, directions, 0.0, None, |_, hit| {
                 backs += u32::from(hit.is_some_and(|hit| !hit.front));
             });
-            cast += RAYS_AT_ONCE;
+            cast += batch;
         }
-        f64::from(backs) < most
+        f64::from(backs) < max_backs
     }
 }
 

@@ -8,7 +8,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::mesh::contacts::{ContactSegment, part_inside};
 
-/// Steps of the lattice along a side.
+/// Steps of the lattice along a side: those of a 32-bit coordinate in a file.
 pub(super) const STEPS: u32 = 1 << 24;
 
 /// A point of a triangle on the lattice: the weights of its second and third corner, in steps.
@@ -65,8 +65,8 @@ impl Snapping {
     /// side or another point, if these are near.
     fn snapped(&mut self, point: DVec2) -> LatticePoint {
         let weights = [1.0 - point.x - point.y, point.x, point.y].map(|w| w.clamp(0.0, 1.0));
-        let place = |w: [f64; 3]| (0..3).map(|k| w[k] * self.corners[k]).sum::<DVec3>();
-        let corner = (0..3).find(|&k| place(weights).distance(self.corners[k]) < self.distance);
+        let point = |w: [f64; 3]| (0..3).map(|k| w[k] * self.corners[k]).sum::<DVec3>();
+        let corner = (0..3).find(|&k| point(weights).distance(self.corners[k]) < self.distance);
         if let Some(k) = corner {
             return [[0, 0], [STEPS, 0], [0, STEPS]][k];
         }
@@ -88,7 +88,7 @@ impl Snapping {
             }
         };
         let [u, v] = lattice.map(|k| f64::from(k) / f64::from(STEPS));
-        let position = place([1.0 - u - v, u, v]);
+        let position = point([1.0 - u - v, u, v]);
         let cell = (position / self.distance).floor().as_i64vec3().to_array();
         for dx in -1..=1 {
             for dy in -1..=1 {

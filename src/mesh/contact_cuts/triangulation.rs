@@ -37,7 +37,7 @@ impl CutTriangle {
         let [a, b, c] = self.corners;
         // A power of two keeps points on a side exactly on it, and angles about right.
         let stretch = (b.distance(a) / c.distance(a)).log2().round().exp2();
-        let place = |[u, v]: LatticePoint| {
+        let position = |[u, v]: LatticePoint| {
             let [u, v] = [u, v].map(|k| f64::from(k) / f64::from(STEPS));
             Point2::new(u * stretch, v)
         };
@@ -48,24 +48,24 @@ impl CutTriangle {
             steps.sort_unstable();
             let on_side = |step: u32| [[step, 0], [STEPS - step, step], [0, STEPS - step]][k];
             for pair in steps.windows(2) {
-                let from = triangulation.insert(place(on_side(pair[0]))).ok()?;
-                let to = triangulation.insert(place(on_side(pair[1]))).ok()?;
+                let from = triangulation.insert(position(on_side(pair[0]))).ok()?;
+                let to = triangulation.insert(position(on_side(pair[1]))).ok()?;
                 triangulation.add_constraint(from, to);
             }
         }
         for &[from, to] in &cuts.segments {
-            let from = triangulation.insert(place(from)).ok()?;
-            let to = triangulation.insert(place(to)).ok()?;
+            let from = triangulation.insert(position(from)).ok()?;
+            let to = triangulation.insert(position(to)).ok()?;
             triangulation.add_constraint_and_split(from, to, |point| point);
         }
         // In these coordinates the whole triangle has half the stretch as area.
         let area = 0.5 * (b - a).cross(c - a).length();
-        let least_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
+        let min_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
         // Below 20.7 degrees it terminates (Ruppert 1995).
         triangulation.refine(
             RefinementParameters::new()
                 .keep_constraint_edges()
-                .with_min_required_area(least_area)
+                .with_min_required_area(min_area)
                 .with_max_additional_vertices(1000)
                 .with_angle_limit(AngleLimit::from_deg(20.0)),
         );
@@ -130,20 +130,17 @@ mod tests {
     use crate::mesh::contact_cuts::snapping::side_steps;
     use fastrand::Rng;
 
-    /// The triangle of the property below, scene unit.
-    const CORNERS: [DVec3; 3] =
-        [DVec3::new(1.0, 2.0, 3.0), DVec3::new(7.0, 1.0, 2.0), DVec3::new(2.0, 9.0, 8.0)];
-
     fn triangle(finest: f64) -> CutTriangle {
+        let corners = [[1.0, 2.0, 3.0], [7.0, 1.0, 2.0], [2.0, 9.0, 8.0]].map(DVec3::from_array);
         let side = |reversed| Side { id: 0, reversed };
-        CutTriangle { corners: CORNERS, sides: [side(false), side(true), side(false)], finest }
+        CutTriangle { corners, sides: [side(false), side(true), side(false)], finest }
     }
 
     #[test]
     fn pieces_cover_a_triangle_whatever_cuts_it() {
         let mut rng = Rng::with_seed(7);
         let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a) / 2.0;
-        let whole = area(CORNERS);
+        let whole = area(triangle(0.5).corners);
         for round in 0..500 {
             // Coarse lattices make points coincide and segments overlap or meet in one point.
             let coarse = STEPS >> rng.u32(1..12);

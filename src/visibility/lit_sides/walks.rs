@@ -105,8 +105,8 @@ impl<'a> Walks<'a> {
         let free = sheets.sample(&sides, |side, rng| {
             let start = self.random_start(side, rng)?;
             let direction = self.random_direction(side, rng);
-            let (at, met) = self.next(start, side, direction)?;
-            (self.scene.exitance(met / 2) == Rgb::ZERO).then(|| start.distance(at))
+            let (at, hit_side) = self.next(start, side, direction)?;
+            (self.scene.exitance(hit_side / 2) == Rgb::ZERO).then(|| start.distance(at))
         });
         let shines_from_back = |&t: &usize| {
             let other = self.other_sides.get(&t);
@@ -174,16 +174,16 @@ impl<'a> Walks<'a> {
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
         let reach = (FILE_TOLERANCE * self.scene.area(t).sqrt()).max(self.contact);
-        let found = Cell::new(None);
+        let covering = Cell::new(None);
         self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
             let alike = self.normals[hit.triangle].dot(normal) > 0.999;
             let counts = hit.front && hit.triangle != t && alike;
             if counts {
-                found.set(Some(hit.triangle));
+                covering.set(Some(hit.triangle));
             }
             counts
         });
-        found.get()
+        covering.get()
     }
 
     /// Unit normal on a side.

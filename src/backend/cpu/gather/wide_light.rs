@@ -31,13 +31,6 @@ pub(super) struct WideLight {
     pyramids: Vec<[DVec3; 3]>,
 }
 
-/// Number of points by which their weights are compared. Plain choice.
-const POINTS: u32 = 32;
-
-/// Minimum expected number of rays towards a light: of fewer there may be none (with a probability
-/// of e⁻⁸ for independent rays).
-const MIN_RAYS: f64 = 8.0;
-
 impl WideLight {
     /// The light `light` with this number and unoccluded form factor, seen from `point`.
     pub fn new(
@@ -68,13 +61,16 @@ impl WideLight {
         point: &GatherPoint,
         min_rays: u32,
     ) -> bool {
-        if !light.convex || f64::from(min_rays) * unoccluded < MIN_RAYS {
+        // Of fewer than 8 expected rays there may be none: of independent ones with a probability
+        // above e⁻⁸.
+        if !light.convex || f64::from(min_rays) * unoccluded < 8.0 {
             return false;
         }
-        let weights = (0..POINTS).map(|i| point_on(light, scene, point, sobol_02_point(i)).factor);
+        let count = 32; // plain choice
+        let weights = (0..count).map(|i| point_on(light, scene, point, sobol_02_point(i)).factor);
         let (sum, squares) =
             weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
-        let worth = sum * sum / (squares * f64::from(POINTS)).max(f64::MIN_POSITIVE);
+        let worth = sum * sum / (squares * f64::from(count)).max(f64::MIN_POSITIVE);
         unoccluded * f64::from(RAYS_PER_SHADOW_RAY) > worth
     }
 

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use super::element::{between, element_at};
-use crate::backend::gpu::layout::ELEMENTS_A_LINE;
+use crate::backend::gpu::layout::TEXELS_PER_LINE;
 
 #[derive(Clone, Copy, Debug)]
 pub struct OnElement {
@@ -15,7 +15,7 @@ pub struct OnElement {
     pub side: u32,
 }
 
-/// The field at a position of a triangle: `elements` are texels of lines of [`ELEMENTS_A_LINE`],
+/// The field at a position of a triangle: `elements` are texels of lines of [`TEXELS_PER_LINE`],
 /// the corners of an element below one another, each with a channel of its reflectance.
 pub fn field_at(
     quadtrees: &[u32],
@@ -25,8 +25,8 @@ pub fn field_at(
 ) -> OnElement {
     let at = element_at(quadtrees, triangle, weights);
     let corners = [0, 1, 2].map(|k| {
-        let line = at.element / ELEMENTS_A_LINE * 3 + k;
-        Vec4::from(elements[(line * ELEMENTS_A_LINE + at.element % ELEMENTS_A_LINE) as usize])
+        let line = at.element / TEXELS_PER_LINE * 3 + k;
+        Vec4::from(elements[(line * TEXELS_PER_LINE + at.element % TEXELS_PER_LINE) as usize])
     });
     OnElement {
         radiosity: between(corners.map(Vec4::truncate), at.weights),

@@ -1,81 +1,71 @@
 //! Twin of `shaders/shared/gather_state.wgsl`: the state of each point of a gather between passes.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
+use crate::backend::gpu::layout::{LANES, shared_structs};
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
 
-/// Size of a workgroup; each serves one point.
-pub const LANES: u32 = 64;
-
-/// Number of lights and the sun.
-pub const SOURCES: usize = MAX_EXPLICIT_LIGHTS + 1;
-
-/// Index of the sun in `visible`.
+/// Index of the sun in `visible`, after the lights.
 pub const SUN: usize = MAX_EXPLICIT_LIGHTS;
 
-/// Sums over rays.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct RaySums {
-    /// Light reflected by surfaces and from the sky, except for near surfaces and lights sampled
-    /// separately.
-    pub light: [f32; 3],
-    pub escaped: f32,
-    /// Exitance of the other lights.
-    pub lamps: [f32; 3],
-    pub back: f32,
-    pub inverse_distance: f32,
-    /// The largest contribution of one ray to `light`: its length over the channels.
-    pub largest: f32,
-    /// Number of rays that meet near surfaces.
-    pub near: f32,
-    /// The same as `largest` of `near_light`.
-    pub near_largest: f32,
-    /// Light of near surfaces by the field.
-    pub near_light: [f32; 3],
-    pub padding: f32,
-}
+shared_structs! {
+    /// Sums over rays.
+    pub struct RaySums {
+        /// Light reflected by surfaces and from the sky, except for near surfaces and lights
+        /// sampled separately.
+        pub light: [f32; 3],
+        pub escaped: f32,
+        /// Exitance of the other lights.
+        pub lamps: [f32; 3],
+        pub back: f32,
+        pub inverse_distance: f32,
+        /// The largest contribution of one ray to `light`: its length over the channels.
+        pub largest: f32,
+        /// Number of rays that meet near surfaces.
+        pub near: f32,
+        /// The same as `largest` of `near_light`.
+        pub near_largest: f32,
+        /// Light of near surfaces by the field.
+        pub near_light: [f32; 3],
+        pub padding: f32,
+    }
 
-/// Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Visible {
-    pub seen: [f32; 3],
-    pub all: f32,
-}
+    /// Sums of form factors of points on a light, or of rays towards it: the visible ones, and all.
+    pub struct Visible {
+        pub seen: [f32; 3],
+        pub all: f32,
+    }
 
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct RankedLight {
-    pub light: u32,
-    /// Unoccluded form factor to all of it.
-    pub factor: f32,
-    /// Whether rays over the hemisphere estimate its visible share.
-    pub is_wide: u32,
-    pub padding: u32,
-}
+    /// A light that is sampled separately.
+    pub struct RankedLight {
+        pub light: u32,
+        /// Unoccluded form factor to all of it.
+        pub factor: f32,
+        /// Whether rays over the hemisphere estimate its visible share.
+        pub is_wide: u32,
+        pub padding: u32,
+    }
 
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PointState {
-    /// The first half, or all earlier rays; the second half.
-    pub rays: [RaySums; 2],
-    pub lights: [RankedLight; MAX_EXPLICIT_LIGHTS],
-    /// By light and sun, for the first half; for the second.
-    pub visible: [Visible; 2 * SOURCES],
-    pub light_count: u32,
-    /// Number of rays over the hemisphere.
-    pub ray_count: u32,
-    /// Number of rays to each light.
-    pub shadow_count: u32,
-    /// 1: rays were doubled; 2: rays to lights were doubled; 3: these are the first of both.
-    pub pending: u32,
-    pub ray_error: f32,
-    pub shadow_error: f32,
-    /// Whether paths found the light of near surfaces for earlier rays.
-    pub covered: u32,
-    pub padding: u32,
+    /// A point of a gather.
+    pub struct PointState {
+        /// The first half, or all earlier rays; the second half.
+        pub rays: [RaySums; 2],
+        pub lights: [RankedLight; MAX_EXPLICIT_LIGHTS],
+        /// For the first half and the second, by light and sun.
+        pub visible: [[Visible; SUN + 1]; 2],
+        pub light_count: u32,
+        /// Number of rays over the hemisphere.
+        pub ray_count: u32,
+        /// Number of rays to each light.
+        pub shadow_count: u32,
+        /// 1: rays were doubled; 2: rays to lights were doubled; 3: these are the first of both.
+        pub pending: u32,
+        pub ray_error: f32,
+        pub shadow_error: f32,
+        /// Whether paths found the light of near surfaces for earlier rays.
+        pub covered: u32,
+        pub padding: u32,
+    }
 }
 
 impl PointState {

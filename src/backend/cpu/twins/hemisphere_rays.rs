@@ -4,12 +4,12 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 
 use super::field::{OnElement, field_at};
-use super::gather_state::{LANES, PointState, RaySums, SOURCES, Visible, added_up};
+use super::gather_state::{PointState, RaySums, Visible, added_up};
 use super::lights::{passed, ray_from};
 use super::near_field::is_near;
 use super::sky::from_sky;
-use super::trace::{FAR, Hit, Ray, meet, nearest, turned};
-use crate::backend::gpu::layout::{GatherSettings, NOTHING, TracedLight, TracedPoint};
+use super::trace::{Hit, Ray, intersect, nearest, turned};
+use crate::backend::gpu::layout::{FAR, GatherSettings, LANES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::{MAX_EXPLICIT_LIGHTS, NO_LIGHT};
 
@@ -26,17 +26,17 @@ pub struct HemisphereRays<'a> {
 /// Results of rays, for wide lights by their index among those of the point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Found {
+pub struct RayResult {
     pub sums: RaySums,
     pub lights: [Visible; MAX_EXPLICIT_LIGHTS],
 }
 
-impl Found {
-    pub fn add(&mut self, other: &Found) {
+impl RayResult {
+    pub fn add(&mut self, other: &RayResult) {
         let largest = self.sums.largest.max(other.sums.largest);
         let near_largest = self.sums.near_largest.max(other.sums.near_largest);
-        let terms = bytemuck::cast_slice::<Found, f32>(std::slice::from_ref(other));
-        let sums = bytemuck::cast_slice_mut::<Found, f32>(std::slice::from_mut(self));
+        let terms = bytemuck::cast_slice::<RayResult, f32>(std::slice::from_ref(other));
+        let sums = bytemuck::cast_slice_mut::<RayResult, f32>(std::slice::from_mut(self));
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
         (self.sums.largest, self.sums.near_largest) = (largest, near_largest);
     }
@@ -61,14 +61,14 @@ impl HemisphereRays<'_> {
         state: &mut PointState,
     ) {
         let [from, middle, to] = range(state.ray_count, state, settings);
-        let mut lanes = [[Found::default(); LANES as usize]; 2];
+        let mut lanes = [[RayResult::default(); LANES as usize]; 2];
         for k in from..to {
-            let found = self.cast_ray(point, self.direction(k, point), state);
+            let result = self.cast_ray(point, self.direction(k, point), state);
             let half = usize::from(k >= middle);
-            lanes[half][((k - from) % LANES) as usize].add(&found);
+            lanes[half][((k - from) % LANES) as usize].add(&result);
         }
         for (half, lanes) in lanes.into_iter().enumerate() {
-            let sum = |of: &dyn Fn(&Found) -> Vec4| added_up(lanes.each_ref().map(of));
+            let sum = |of: &dyn Fn(&RayResult) -> Vec4| added_up(lanes.each_ref().map(of));
             let vector = |v: [f32; 3], last: f32| Vec3::from(v).extend(last);
             let light = sum(&|f| vector(f.sums.light, f.sums.escaped));
             let emitted = sum(&|f| vector(f.sums.lamps, f.sums.back));
@@ -81,7 +81,7 @@ impl HemisphereRays<'_> {
             out.back += emitted.w;
             out.inverse_distance += rest.x;
             let largest = |of: fn(&RaySums) -> f32, start: f32| {
-                lanes.iter().map(|found| of(&found.sums)).fold(start, f32::max)
+                lanes.iter().map(|result| of(&result.sums)).fold(start, f32::max)
             };
             out.largest = largest(|sums| sums.largest, out.largest);
             out.near_largest = largest(|sums| sums.near_largest, out.near_largest);
@@ -90,7 +90,7 @@ impl HemisphereRays<'_> {
             for k in 0..state.light_count as usize {
                 if state.lights[k].is_wide != 0 {
                     let of_light = sum(&|f| vector(f.lights[k].seen, f.lights[k].all));
-                    let out = &mut state.visible[half * SOURCES + k];
+                    let out = &mut state.visible[half][k];
                     out.seen = (Vec3::from(out.seen) + of_light.truncate()).to_array();
                     out.all += of_light.w;
                 }
@@ -111,41 +111,41 @@ impl HemisphereRays<'_> {
     }
 
     /// The result of one ray.
-    pub fn cast_ray(&self, point: &TracedPoint, direction: Vec3, state: &PointState) -> Found {
+    pub fn cast_ray(&self, point: &TracedPoint, direction: Vec3, state: &PointState) -> RayResult {
         let scene = self.scene;
         let ray = ray_from(point, direction);
         let hit = nearest(scene, &ray);
         let is_surface = hit.triangle != NOTHING;
         let share = passed(scene, &ray, if is_surface { hit.distance } else { FAR });
-        let mut found = Found::default();
+        let mut result = RayResult::default();
         let mut of_light = NO_LIGHT;
         if is_surface && hit.front {
             of_light = scene.triangles[hit.triangle as usize].light;
         }
         let mut is_known = false;
-        for (ranked, visible) in state.ranked().iter().zip(&mut found.lights) {
-            let is_met = ranked.light == of_light;
-            is_known |= is_met;
+        for (ranked, visible) in state.ranked().iter().zip(&mut result.lights) {
+            let is_hit = ranked.light == of_light;
+            is_known |= is_hit;
             if ranked.is_wide != 0 {
-                if is_met {
+                if is_hit {
                     visible.seen = share.to_array();
                 }
                 let light = &scene.lights[ranked.light as usize];
-                visible.all = f32::from(is_met || is_towards(scene, &ray, light));
+                visible.all = f32::from(is_hit || is_towards(scene, &ray, light));
             }
         }
-        let sums = &mut found.sums;
+        let sums = &mut result.sums;
         if !is_surface {
             let light = from_sky(scene, direction) * share;
             sums.escaped = 1.0;
             sums.light = light.to_array();
             sums.largest = light.length();
-            return found;
+            return result;
         }
         sums.inverse_distance = 1.0 / hit.distance;
         if !hit.front {
             sums.back = 1.0;
-            return found;
+            return result;
         }
         let there = self.field_at(&hit);
         let light = there.radiosity * share;
@@ -161,7 +161,7 @@ impl HemisphereRays<'_> {
             let exitance = Vec3::from(scene.lights[of_light as usize].exitance);
             sums.lamps = (exitance * share).to_array();
         }
-        found
+        result
     }
 }
 
@@ -169,7 +169,7 @@ impl HemisphereRays<'_> {
 fn is_towards(scene: &TracedArrays, ray: &Ray, light: &TracedLight) -> bool {
     let lamps = &scene.lamps[light.first as usize..(light.first + light.count) as usize];
     lamps.iter().any(|lamp| {
-        let hit = meet(scene, lamp.triangle, ray, FAR, 1.0);
+        let hit = intersect(scene, lamp.triangle, ray, FAR, 1.0);
         hit.triangle != NOTHING && hit.front
     })
 }

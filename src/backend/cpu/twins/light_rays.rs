@@ -2,12 +2,12 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::gather_state::{LANES, PointState, SOURCES, SUN, added_up};
+use super::gather_state::{PointState, SUN, added_up};
 use super::hemisphere_rays::range;
-use super::lights::{ANY_LIGHT, passed, ray_from, rotated_sobol, to_light};
+use super::lights::{passed, ray_from, rotated_sobol, to_light};
 use super::sky::towards_sun;
-use super::trace::{FAR, is_hidden};
-use crate::backend::gpu::layout::{GatherSettings, TracedPoint};
+use super::trace::is_hidden;
+use crate::backend::gpu::layout::{ANY_LIGHT, FAR, GatherSettings, LANES, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
 /// The rays of one pass from a point.
@@ -26,7 +26,7 @@ pub fn cast_rays(
         }
         for (half, lanes) in lanes.into_iter().enumerate() {
             let sum = added_up(lanes);
-            let out = &mut state.visible[half * SOURCES + source];
+            let out = &mut state.visible[half][source];
             out.seen = (Vec3::from(out.seen) + sum.truncate()).to_array();
             out.all += sum.w;
         }

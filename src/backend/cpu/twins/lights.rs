@@ -4,12 +4,9 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::trace::{Ray, is_solid, meet, walk};
+use super::trace::{Ray, intersect, is_solid, walk};
 use crate::backend::gpu::layout::{HAS_HOLES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
-
-/// Light of no triangle: the sun is hidden by any hit.
-pub const ANY_LIGHT: u32 = 0xffff_fffe;
 
 /// Transmittance of clear panes between the ray's near distance and `end`.
 pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
@@ -18,7 +15,7 @@ pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
         return share;
     }
     walk(scene, scene.info.panes, ray, end, |k| {
-        let hit = meet(scene, k, ray, end, 0.0);
+        let hit = intersect(scene, k, ray, end, 0.0);
         if hit.triangle != NOTHING && hit.distance + hit.off < end {
             let row = scene.triangles[k as usize].light as usize;
             share *= Vec3::from(scene.lights[row].exitance);

@@ -3,9 +3,8 @@
 use glam::Vec3;
 
 use super::trace::Hit;
+use crate::backend::gpu::layout::MIN_COVERED;
 use crate::backend::gpu::traced_scene::TracedArrays;
-
-const MIN_COVERED: f32 = 0.5;
 
 /// Whether a hit is nearer than its element is wide, of which there are `side` along an edge of the
 /// triangle.

@@ -4,22 +4,18 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::gather_state::{LANES, PointState, RankedLight, added_up};
+use super::gather_state::{PointState, RankedLight, added_up};
 use super::hemisphere_rays::{HemisphereRays, range};
-use super::lights::{ANY_LIGHT, passed, ray_from, to_light};
+use super::lights::{passed, ray_from, to_light};
 use super::near_field::{is_covered, is_near};
 use super::sky::{from_sky, towards_sun};
-use super::trace::{FAR, Hit, is_hidden, nearest, nearest_but, turned};
+use super::trace::{Hit, is_hidden, nearest, nearest_but, turned};
 use crate::backend::gpu::layout::{
-    GatherSettings, NOTHING, ROW_OF_FLAGS, TracedPoint, TracedTriangle,
+    ANY_LIGHT, FAR, GatherSettings, LANES, LIFT, MAX_SURVIVAL, MAX_VERTICES, NOTHING, ROW_OF_FLAGS,
+    TracedPoint, TracedTriangle,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::NO_LIGHT;
-
-const MAX_VERTICES: u32 = 128;
-const MAX_SURVIVAL: f32 = 0.999;
-/// Height of a vertex above its triangle.
-const LIFT: f32 = 9.536_743e-7;
 
 /// Random numbers of one path.
 #[derive(Clone, Copy, Debug)]
@@ -56,15 +52,11 @@ pub struct Shift<'a> {
 }
 
 impl Shift<'_> {
-    /// No deviation.
-    pub const NONE: Shift<'static> =
-        Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
-
     fn direction(&self, direction: Vec3) -> Vec3 {
         (self.turned)(direction, self.across)
     }
 
-    fn place(&self, at: Vec2) -> Vec2 {
+    fn moved(&self, at: Vec2) -> Vec2 {
         (at + self.across).clamp(Vec2::ZERO, Vec2::ONE)
     }
 
@@ -83,13 +75,14 @@ pub fn follow_paths(
 ) {
     let [from, middle, to] = range(state.ray_count, state, settings);
     let covered = covered_halves(state);
+    let none = Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
     let mut lanes = [[Vec4::ZERO; LANES as usize]; 2];
     for k in from..to {
         let half = usize::from(k >= middle);
         if covered[half] {
-            let found = near_light(rays, point, k, state, Shift::NONE);
+            let light = near_light(rays, point, k, state, none);
             let lane = &mut lanes[half][((k - from) % LANES) as usize];
-            *lane = (lane.truncate() + found).extend(lane.w.max(found.length()));
+            *lane = (lane.truncate() + light).extend(lane.w.max(light.length()));
         }
     }
     for (out, lanes) in state.rays.iter_mut().zip(lanes) {
@@ -139,7 +132,7 @@ impl Path<'_> {
     /// Radiosity that a front with this reflectance reflects at a hit, without its emission.
     fn light(mut self, mut hit: Hit, mut reflectance: Vec3) -> Vec3 {
         let scene = self.rays.scene;
-        let mut found = Vec3::ZERO;
+        let mut sum = Vec3::ZERO;
         let mut throughput = Vec3::ONE;
         for vertex in 1..=MAX_VERTICES {
             let t = &scene.triangles[hit.triangle as usize];
@@ -147,7 +140,7 @@ impl Path<'_> {
             if vertex > 1 {
                 let survival = (reflectance + through).max_element().min(MAX_SURVIVAL);
                 if self.random.next() >= survival {
-                    return found;
+                    return sum;
                 }
                 throughput /= survival;
             }
@@ -162,9 +155,9 @@ impl Path<'_> {
             }
             throughput *= leaves;
             let at = self.shift.point(on_triangle(t, hit.u, hit.v, side));
-            found += throughput * self.irradiance_of_lights(&at);
+            sum += throughput * self.irradiance_of_lights(&at);
             if scene.info.has_sun != 0 {
-                found += throughput * self.irradiance_of_sun(&at);
+                sum += throughput * self.irradiance_of_sun(&at);
             }
             let (square, turn) = (self.random.next(), self.random.next());
             let local = Vec3::new(square.sqrt(), 0.0, (1.0 - square).sqrt());
@@ -172,28 +165,28 @@ impl Path<'_> {
             let ray = ray_from(&at, direction);
             hit = nearest_but(scene, &ray, t.index);
             if hit.triangle == NOTHING {
-                return found + throughput * passed(scene, &ray, FAR) * from_sky(scene, direction);
+                return sum + throughput * passed(scene, &ray, FAR) * from_sky(scene, direction);
             }
             if !hit.front {
-                return found;
+                return sum;
             }
             throughput *= passed(scene, &ray, hit.distance);
-            let met = &scene.triangles[hit.triangle as usize];
-            if met.light != NO_LIGHT {
-                let light = &scene.lights[met.light as usize];
-                let facing = (-normal_of(met).dot(direction)).max(0.0);
+            let next = &scene.triangles[hit.triangle as usize];
+            if next.light != NO_LIGHT {
+                let light = &scene.lights[next.light as usize];
+                let facing = (-normal_of(next).dot(direction)).max(0.0);
                 let above = Vec3::from(at.normal).dot(direction).max(0.0);
                 let factor = light.area * facing * above / (PI * hit.distance * hit.distance);
-                let share = balance(factor, chance_of(scene, self.state, met.light));
-                found += throughput * Vec3::from(light.exitance) * share;
+                let share = balance(factor, chance_of(scene, self.state, next.light));
+                sum += throughput * Vec3::from(light.exitance) * share;
             }
             let there = self.rays.field_at(&hit);
             if vertex == MAX_VERTICES || !is_near(scene, &hit, there.side) {
-                return found + throughput * there.radiosity;
+                return sum + throughput * there.radiosity;
             }
             reflectance = there.reflectance;
         }
-        found
+        sum
     }
 
     /// Irradiance at a vertex from one point of a light, with the share that the balance leaves to
@@ -204,9 +197,9 @@ impl Path<'_> {
             return Vec3::ZERO;
         }
         let number = choose_light(scene, self.state, self.random.next());
-        let place = Vec2::new(self.random.next(), self.random.next());
+        let at_square = Vec2::new(self.random.next(), self.random.next());
         let light = &scene.lights[number as usize];
-        let to = to_light(scene, light, at, self.shift.place(place));
+        let to = to_light(scene, light, at, self.shift.moved(at_square));
         if to.factor <= 0.0 || !to.is_solid || is_hidden(scene, &to.ray, to.distance, ANY_LIGHT) {
             return Vec3::ZERO;
         }
@@ -217,8 +210,8 @@ impl Path<'_> {
     /// Irradiance at a vertex from one point of the sun.
     fn irradiance_of_sun(&mut self, at: &TracedPoint) -> Vec3 {
         let scene = self.rays.scene;
-        let place = Vec2::new(self.random.next(), self.random.next());
-        let direction = self.shift.direction(towards_sun(scene, place));
+        let at_square = Vec2::new(self.random.next(), self.random.next());
+        let direction = self.shift.direction(towards_sun(scene, at_square));
         let cosine = Vec3::from(at.normal).dot(direction);
         let ray = ray_from(at, direction);
         if cosine <= 0.0 || is_hidden(scene, &ray, FAR, ANY_LIGHT) {

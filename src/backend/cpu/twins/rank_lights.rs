@@ -4,19 +4,15 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::gather_state::{LANES, PointState, RankedLight, added_up};
+use super::gather_state::{PointState, RankedLight, added_up};
 use super::lights::{from_point, sobol, to_light};
 use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
-use crate::backend::gpu::layout::{GatherSettings, TracedLight, TracedPoint, TracedTriangle};
+use crate::backend::gpu::layout::{
+    EVENNESS_POINTS, GatherSettings, LANES, MIN_IRRADIANCE_SHARE, MIN_RAYS, TracedLight,
+    TracedPoint, TracedTriangle,
+};
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
-
-/// Lights below this share of the total unoccluded irradiance are not sampled separately.
-pub const MIN_IRRADIANCE_SHARE: f32 = 1e-3;
-
-/// Number of points for the evenness of a light; minimum expected number of rays that hit a light.
-const EVENNESS_POINTS: u32 = 32;
-const LEAST_RAYS: f32 = 8.0;
 
 /// n · Γ of one side of a polygon seen from the origin: its angle times the cosine of its plane.
 pub fn side(a: Vec3, b: Vec3, normal: Vec3) -> f32 {
@@ -155,5 +151,5 @@ fn is_wide(
     let sum = added_up(weights);
     // Points of weights w have the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     let worth = sum.x * sum.x / (sum.y * EVENNESS_POINTS as f32).max(1e-37);
-    settings.min_rays as f32 * factor >= LEAST_RAYS && factor * RAYS_PER_SHADOW_RAY as f32 > worth
+    settings.min_rays as f32 * factor >= MIN_RAYS && factor * RAYS_PER_SHADOW_RAY as f32 > worth
 }

@@ -5,8 +5,10 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::element::element_at;
 use super::lights::passed;
-use super::trace::{FAR, Hit, Ray, nearest_but, turned};
-use crate::backend::gpu::layout::{BACK, FIRST_ELEMENT, NOTHING, OPEN, RowSettings, TracedPatch};
+use super::trace::{Hit, Ray, nearest_but, turned};
+use crate::backend::gpu::layout::{
+    BACK, FAR, FIRST_FRONT, NOTHING, OPEN, RowSettings, TracedPatch,
+};
 use crate::backend::gpu::traced_scene::TracedArrays;
 
 /// Bindings of the shader.
@@ -42,7 +44,7 @@ impl RowRays<'_> {
     }
 
     /// A ray, and its hit.
-    pub fn met(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
+    pub fn intersect(&self, patch: &TracedPatch, direction: Vec3) -> (Ray, Hit) {
         let (origin, origin_low) = (patch.position.into(), patch.position_low.into());
         let ray = Ray { origin, origin_low, direction, near: patch.near };
         (ray, nearest_but(self.scene, &ray, patch.own_triangle))
@@ -51,14 +53,14 @@ impl RowRays<'_> {
     /// The slot that a ray hits, and the transmittance of panes on the way.
     pub fn cast_ray(&self, patch: &TracedPatch, direction: Vec3) -> (u32, Vec3) {
         let scene = self.scene;
-        let (ray, hit) = self.met(patch, direction);
+        let (ray, hit) = self.intersect(patch, direction);
         let mut slot = OPEN;
         if hit.triangle != NOTHING {
             slot = BACK;
             if hit.front {
                 let index = scene.triangles[hit.triangle as usize].index;
                 let at = element_at(self.quadtrees, index, Vec2::new(hit.u, hit.v));
-                slot = FIRST_ELEMENT + at.element;
+                slot = FIRST_FRONT + at.element;
             }
         }
         let end = if hit.triangle != NOTHING { hit.distance } else { FAR };

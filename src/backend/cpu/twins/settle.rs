@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::gather_state::{PointState, RaySums, SOURCES, SUN, Visible};
+use super::gather_state::{PointState, RaySums, SUN, Visible};
 use super::near_field::is_covered;
 use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
 use crate::backend::gpu::layout::{GatherSettings, Sample, TracedPoint};
@@ -10,7 +10,7 @@ use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::scene::Sun;
 
 /// Visibilities by light and sun.
-type Visibilities = [Visible; SOURCES];
+type Visibilities = [Visible; SUN + 1];
 
 /// The sample of a point, and values that only tests need, to judge how close decisions are.
 #[derive(Clone, Copy, Debug)]
@@ -41,10 +41,6 @@ fn of_lights(
         irradiance += Vec3::from(light.exitance) * Vec3::from(visible.seen) * share;
     }
     irradiance
-}
-
-fn half_of(state: &PointState, half: usize) -> Visibilities {
-    std::array::from_fn(|k| state.visible[half * SOURCES + k])
 }
 
 fn together(a: &Visibilities, b: &Visibilities) -> Visibilities {
@@ -83,7 +79,7 @@ pub fn settle(
     let ray_count = state.ray_count * if pending == 1 { 2 } else { 1 };
     let shadow_count = state.shadow_count * if pending == 2 { 2 } else { 1 };
     let mut halves = state.rays;
-    let seen = [half_of(state, 0), half_of(state, 1)];
+    let seen = state.visible;
     let all_seen = together(&seen[0], &seen[1]);
     let (rays, shadow_rays) = (ray_count as f32, shadow_count as f32);
     let mut covered = state.covered;
@@ -163,9 +159,7 @@ pub fn settle(
             },
             RaySums::default(),
         ];
-        let (first, second) = state.visible.split_at_mut(SOURCES);
-        first.copy_from_slice(&all_seen);
-        second.fill(Visible::default());
+        state.visible = [all_seen, Visibilities::default()];
     }
     Some(Settled { sample, ray_error, shadow_error, allowed })
 }

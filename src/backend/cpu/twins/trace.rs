@@ -4,13 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 
-use crate::backend::gpu::layout::{BACK_IS_COVERED, HAS_HOLES, LEAF, NOTHING};
+use crate::backend::gpu::layout::{BACK_IS_COVERED, FAR, HAS_HOLES, LEAF, NOTHING, ROUNDING};
 use crate::backend::gpu::traced_scene::TracedArrays;
-
-pub const FAR: f32 = 1e30;
-
-/// Bound of rounding in the triangle test, some eight roundings of 2⁻²⁴ each.
-const ROUNDING: f32 = 5e-7;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
@@ -36,7 +31,7 @@ pub struct Hit {
 }
 
 /// The hit of triangle `k`, no farther than `end`; `slack` scales a margin for rounding.
-pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hit {
+pub fn intersect(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hit {
     let t = &scene.triangles[k as usize];
     let [corner, low, edge_u, edge_v] =
         [t.corner, t.corner_low, t.edge_u, t.edge_v].map(Vec3::from);
@@ -50,7 +45,7 @@ pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hi
     let distance = edge_v.dot(q) * inverse;
     let off = ROUNDING * (s.x.abs() + s.y.abs() + s.z.abs()) * t.extent * inverse.abs();
     let seam = -off * slack;
-    let is_met = facing != 0.0
+    let is_hit = facing != 0.0
         && u >= seam
         && v >= seam
         && u + v <= 1.0 - seam
@@ -60,14 +55,15 @@ pub fn meet(scene: &TracedArrays, k: u32, ray: &Ray, end: f32, slack: f32) -> Hi
     let u = u.clamp(0.0, 1.0);
     // Not `clamp`, which panics where the ray is in the triangle's plane and u is NaN.
     let v = v.max(0.0).min(1.0 - u);
-    let is_there = is_met && (t.flags & HAS_HOLES == 0 || is_solid(scene, t.index, u, v));
+    let is_there = is_hit && (t.flags & HAS_HOLES == 0 || is_solid(scene, t.index, u, v));
     let triangle = if is_there { k } else { NOTHING };
     Hit { distance, u, v, triangle, front: facing > 0.0, off: off * t.extent }
 }
 
 /// Whether a triangle's mask is solid there.
 pub fn is_solid(scene: &TracedArrays, index: u32, u: f32, v: f32) -> bool {
-    let [a_b, c, rest] = [0, 1, 2].map(|k| Vec4::from(scene.mask_places[3 * index as usize + k]));
+    let [a_b, c, rest] =
+        [0, 1, 2].map(|k| Vec4::from(scene.mask_coordinates[3 * index as usize + k]));
     let size = Vec2::new(c.w, rest.x);
     let is_clamped = rest.y != 0.0;
     let mut at = a_b.xy() * (1.0 - u - v) + a_b.zw() * u + c.xy() * v;
@@ -85,8 +81,9 @@ pub fn is_solid(scene: &TracedArrays, index: u32, u: f32, v: f32) -> bool {
 
 /// Inverse of a direction, with a lower bound on its components, so that it is finite.
 fn inverse_of(direction: Vec3) -> Vec3 {
-    let least = Vec3::select(direction.cmpge(Vec3::ZERO), Vec3::splat(1e-20), Vec3::splat(-1e-20));
-    1.0 / Vec3::select(direction.abs().cmplt(Vec3::splat(1e-20)), least, direction)
+    let smallest =
+        Vec3::select(direction.cmpge(Vec3::ZERO), Vec3::splat(1e-20), Vec3::splat(-1e-20));
+    1.0 / Vec3::select(direction.abs().cmplt(Vec3::splat(1e-20)), smallest, direction)
 }
 
 /// The child of node `k` to be entered next, the other one on the stack; `None` if none is hit.
@@ -172,7 +169,7 @@ pub fn nearest_but(scene: &TracedArrays, ray: &Ray, own: u32) -> Hit {
     let mut best = Hit { distance: FAR, u: 0.0, v: 0.0, triangle: NOTHING, front: false, off: 0.0 };
     let mut best_index = NOTHING;
     walk(scene, 0, ray, FAR, |k| {
-        let hit = meet(scene, k, ray, best.distance, 1.0);
+        let hit = intersect(scene, k, ray, best.distance, 1.0);
         if hit.triangle != NOTHING {
             let index = scene.triangles[k as usize].index;
             if index != own && (hit.distance < best.distance || index < best_index) {
@@ -189,7 +186,7 @@ pub fn nearest_but(scene: &TracedArrays, ray: &Ray, own: u32) -> Hit {
 pub fn is_hidden(scene: &TracedArrays, ray: &Ray, end: f32, but: u32) -> bool {
     let mut hidden = false;
     walk(scene, 0, ray, end, |k| {
-        let hit = meet(scene, k, ray, end, 1.0);
+        let hit = intersect(scene, k, ray, end, 1.0);
         hidden = hit.triangle != NOTHING
             && hit.distance + hit.off < end
             && !(hit.front && scene.triangles[k as usize].light == but);

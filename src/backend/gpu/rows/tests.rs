@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::*;
-use crate::backend::gpu::layout::FIRST_CELL;
+use crate::backend::gpu::layout::FIRST_FRONT;
 use crate::backend::gpu::test_support::{gpu, read_texture};
 use crate::scene::{Material, Scene, Triangle};
 
@@ -48,13 +48,13 @@ fn faces_look_along_their_frames() {
     for (f, &(x, y)) in pixels.iter().enumerate() {
         let line = Face::rows(f, 64).start + y;
         // Triangle f + 1 has one cell; the patch's own triangle has the first.
-        let want = if f.is_multiple_of(2) { FIRST_CELL + 1 + f as u32 } else { BACK };
+        let want = if f.is_multiple_of(2) { FIRST_FRONT + 1 + f as u32 } else { BACK };
         assert_eq!(items[(line * 64 + x) as usize], want, "face {f}");
     }
     // A marker is 0.1 wide at distance 1 or more: below 12 pixels across, so most see nothing.
     let open = items.iter().filter(|&&i| i == OPEN).count();
     assert!(open > 192 * 64 - 5 * 12 * 12 && open < 192 * 64, "{open}");
-    assert!(!items.contains(&FIRST_CELL), "its own triangle is never hit");
+    assert!(!items.contains(&FIRST_FRONT), "its own triangle is never hit");
 }
 
 #[test]
@@ -81,13 +81,13 @@ fn row_check_rejects_invalid_rows() {
         let entry = |&(slot, count): &(u32, u32)| RowEntry { slot, count, ..Default::default() };
         counts.iter().map(entry).collect()
     };
-    let seen = FIRST_ELEMENT + 1;
+    let seen = FIRST_FRONT + 1;
     let good = [(OPEN, total - 10), (BACK, 3), (seen, 7)];
     let good = row_of(&entries(&good), NodeId(5)).unwrap();
     assert_eq!((good.escaped, good.backface), (total - 10, 3));
     assert_eq!(good.entries, [Entry { element: 1, share: 7 }]);
     // Nothing written, all bits set, one unit too few, one too many: sums beyond 32 bits count.
-    let all = [OPEN, BACK, FIRST_ELEMENT, seen].map(|slot| (slot, total));
+    let all = [OPEN, BACK, FIRST_FRONT, seen].map(|slot| (slot, total));
     let bad: [&[(u32, u32)]; 4] =
         [&[], &all, &[(OPEN, total - 10), (BACK, 3), (seen, 6)], &[(OPEN, total), (seen, 1)]];
     for counts in bad {

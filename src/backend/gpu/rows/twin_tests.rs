@@ -60,7 +60,7 @@ fn item_buffer_and_reduce_equal_their_twins() {
             let mut device = vec![0; slots as usize];
             device[OPEN as usize] = *escaped;
             device[BACK as usize] = *backface;
-            entries.iter().for_each(|e| device[(FIRST_ELEMENT + e.element) as usize] = e.share);
+            entries.iter().for_each(|e| device[(FIRST_FRONT + e.element) as usize] = e.share);
             let differ: Vec<_> = (0..row.len())
                 .filter(|&s| row[s] != device[s])
                 .map(|s| (s, device[s], row[s]))

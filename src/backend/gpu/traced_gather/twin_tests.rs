@@ -4,27 +4,28 @@
 
 use std::f32::consts::PI;
 
-use glam::{DVec3, Vec2, Vec3};
+use bytemuck::Zeroable;
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::*;
-use crate::backend::cpu::twins::gather_state::{PointState, SOURCES, SUN};
-use crate::backend::cpu::twins::hemisphere_rays::{Found, HemisphereRays, range};
+use crate::backend::cpu::twins::gather_state::{PointState, SUN};
+use crate::backend::cpu::twins::hemisphere_rays::{HemisphereRays, RayResult, range};
 use crate::backend::cpu::twins::light_rays;
 use crate::backend::cpu::twins::lights::{ray_from, rotated_sobol};
 use crate::backend::cpu::twins::near_paths::{
     self, Shift, chance_of, choose_light, covered_halves,
 };
 use crate::backend::cpu::twins::rank_lights::{
-    MIN_IRRADIANCE_SHARE, Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
+    Seen, factor_of, irradiance_of, rank_lights, seen, side, triangles,
 };
 use crate::backend::cpu::twins::settle::{Settled, settle};
 use crate::backend::cpu::twins::sky::towards_sun;
 use crate::backend::cpu::twins::trace::nearest;
 use crate::backend::gpu::field::{element_texels, quadtrees};
-use crate::backend::gpu::layout::{NOTHING, POINT_STATE_BYTES, TracedLight};
+use crate::backend::gpu::layout::{MIN_IRRADIANCE_SHARE, NOTHING, POINT_STATE_BYTES, TracedLight};
 use crate::backend::gpu::test_support::{
-    gpu, lamp_within_ceiling, narrow_gap, on_sides, places, random_radiosity, read_buffer, shifts,
-    traced_scenes, turned_by, under_sky_and_sun,
+    gather_points, gpu, lamp_within_ceiling, narrow_gap, on_sides, random_radiosity, read_buffer,
+    shifts, traced_scenes, turned_by, under_sky_and_sun,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
@@ -53,6 +54,9 @@ fn gathered_scenes() -> Vec<(&'static str, Mesh)> {
     scenes.push(("narrow gap", narrow_gap()));
     scenes
 }
+
+/// A pass, and the number of its workgroups.
+type Pass<'a> = (&'a BoundPass, &'a wgpu::ComputePipeline, Groups);
 
 /// Number of workgroups of a pass.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +97,7 @@ impl Passes {
         };
         let directions = ordered_directions(&samples, gather.min_rays);
         let points: Vec<TracedPoint> =
-            places(mesh, count).iter().map(|p| gather.traced_point(p)).collect();
+            gather_points(mesh, count).iter().map(|p| gather.traced_point(p)).collect();
         gpu.queue.write_buffer(&slot.points, 0, bytemuck::cast_slice(&points));
         let (quadtrees, elements) = (quadtrees(mesh), element_texels(&field, arrays.radiance_unit));
         Passes { gpu, gather, bound, arrays, quadtrees, elements, directions, points, slot }
@@ -122,12 +126,7 @@ impl Passes {
         self.settings(0, crate::sampling::hemisphere::MAX_RAYS)
     }
 
-    fn run(
-        &self,
-        (bound, pipeline): (&BoundPass, &wgpu::ComputePipeline),
-        settings: &GatherSettings,
-        groups: Groups,
-    ) {
+    fn run(&self, (bound, pipeline, groups): Pass, settings: &GatherSettings) {
         let slot = &self.slot;
         for buffer in [&slot.settings[0], &slot.path_settings[0]] {
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(settings));
@@ -148,6 +147,24 @@ impl Passes {
         read_buffer(&self.gpu, &self.slot.states)
     }
 
+    /// Casts rays from `first` on, at most `count`, from the points of `list` and compares the new
+    /// states with those of the twin.
+    fn step(
+        &self,
+        what: String,
+        pass: Pass,
+        (first, count): (u32, u32),
+        list: &[u32],
+        states: &mut Vec<PointState>,
+        compare: impl Fn(&Step),
+    ) {
+        let settings = self.settings(first, count);
+        self.run(pass, &settings);
+        let before = std::mem::replace(states, self.states());
+        let what = format!("{what} from {first}");
+        compare(&Step { what, passes: self, settings, list, before: &before, after: states });
+    }
+
     /// Runs `settle`: returns states and samples of all points, and the points that it lists.
     fn settle(&self, settings: &GatherSettings) -> (Vec<PointState>, Vec<Sample>, [Vec<u32>; 2]) {
         let slot = &self.slot;
@@ -156,7 +173,7 @@ impl Passes {
         let pipelines = self.gpu.tracing.gather_pipelines(&self.gpu.device);
         let count = self.points.len();
         let groups = Groups::Count(count.div_ceil(64) as u32);
-        self.run((&self.bound.settle, &pipelines.settle), settings, groups);
+        self.run((&self.bound.settle, &pipelines.settle, groups), settings);
         let mut samples: Vec<Sample> = read_buffer(&self.gpu, &slot.samples);
         samples.truncate(count);
         let work: Vec<u32> = read_buffer(&self.gpu, &slot.work);
@@ -169,11 +186,42 @@ impl Passes {
     }
 }
 
-/// Checks that `found` deviates from `expected` by at most `width` and `roundings` roundings of it.
-fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl Fn() -> String) {
-    let off = (f64::from(found) - f64::from(expected)).abs();
-    let most = width + roundings * ROUNDING * f64::from(expected).abs();
-    assert!(off <= most, "{}: {found}, not {expected}: off by {off:e} of {most:e}", what());
+/// A pass that has run, and the states of all points before and after it.
+struct Step<'a> {
+    what: String,
+    passes: &'a Passes,
+    settings: GatherSettings,
+    list: &'a [u32],
+    before: &'a [PointState],
+    after: &'a [PointState],
+}
+
+impl Step<'_> {
+    /// Calls `compare` with a name, the point, and its states before and after, for each point of
+    /// the list; all others must not change.
+    fn compare(&self, compare: impl Fn(&str, &TracedPoint, &PointState, &PointState) + Sync) {
+        (0..self.before.len()).into_par_iter().for_each(|p| {
+            let what = format!("{}, point {p}", self.what);
+            let (was, is) = (&self.before[p], &self.after[p]);
+            match self.list.contains(&(p as u32)) {
+                true => compare(&what, &self.passes.points[p], was, is),
+                false => assert_eq!(was, is, "{what} is not listed"),
+            }
+        });
+    }
+}
+
+/// A point whose origin rounding shifts.
+fn shifted(point: &TracedPoint, origin: Vec3) -> TracedPoint {
+    let position_low = (Vec3::from(point.position_low) + origin).to_array();
+    TracedPoint { position_low, ..*point }
+}
+
+/// Checks that `actual` is `expected` up to `width` and `roundings` roundings of it.
+fn check(actual: f32, expected: f32, (width, roundings): (f64, f64), what: impl Fn() -> String) {
+    let off = (f64::from(actual) - f64::from(expected)).abs();
+    let limit = width + roundings * ROUNDING * f64::from(expected).abs();
+    assert!(off <= limit, "{}: {actual}, not {expected}: off by {off:e} of {limit:e}", what());
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -186,35 +234,33 @@ fn check(found: f32, expected: f32, (width, roundings): (f64, f64), what: impl F
 /// twin's triangles are widened there, by more the longer and thinner they are: by at most 2⁻¹⁷
 /// here.
 #[test]
-fn twin_meets_what_exact_rays_meet() {
+fn twin_hits_what_exact_rays_hit() {
     let mut at_sides = 0;
     for (name, mesh) in traced_scenes() {
-        let lights = Lights::new(mesh.shared_scene());
-        let arrays = TracedArrays::new(&lights);
+        let arrays = TracedArrays::new(&Lights::new(mesh.shared_scene()));
         let exact = RayScene::of_scene(mesh.scene());
         let samples = HemisphereSamples::progressive(1024);
         let sides = on_sides(&mesh, 7);
         let (mut rays, mut differ) = (0, 0);
-        for place in places(&mesh, 12) {
-            let point = traced(&arrays, &place);
-            let what = format!("{name}, {place:?}");
-            for direction in samples.directions(place.normal, 0.3) {
+        for at in gather_points(&mesh, 12) {
+            let point = traced(&arrays, &at);
+            let what = format!("{name}, {at:?}");
+            for direction in samples.directions(at.normal, 0.3) {
                 rays += 1;
-                differ +=
-                    u32::from(differs(&what, (&arrays, &exact), &point, &place, direction, 1.0));
+                differ += u32::from(differs(&what, (&arrays, &exact), &point, &at, direction, 1.0));
             }
-            let to_sides = sides.iter().map(|side| (side - place.position).normalize());
-            for direction in to_sides.filter(|d| d.dot(place.normal) > 0.0) {
+            let to_sides = sides.iter().map(|side| (side - at.position).normalize());
+            for direction in to_sides.filter(|d| d.dot(at.normal) > 0.0) {
                 at_sides +=
-                    u32::from(differs(&what, (&arrays, &exact), &point, &place, direction, 8.0));
+                    u32::from(differs(&what, (&arrays, &exact), &point, &at, direction, 8.0));
             }
         }
-        println!("{name}: {differ} of {rays} rays meet something else");
+        println!("{name}: {differ} of {rays} rays have another hit");
         // A ray is within 2⁻²⁰ of some hundred sides, each a radian long, in 1e-4 of the
         // hemisphere.
         assert!(differ * 1000 < rays, "{name}: {differ} of {rays} rays");
     }
-    println!("{at_sides} rays to sides meet something else");
+    println!("{at_sides} rays to sides have another hit");
     assert!(at_sides > 0);
 }
 
@@ -224,22 +270,22 @@ fn differs(
     what: &str,
     (arrays, exact): (&TracedArrays, &RayScene),
     point: &TracedPoint,
-    place: &GatherPoint,
+    at: &GatherPoint,
     direction: DVec3,
     apart: f32,
 ) -> bool {
     let unit = 1.0 / arrays.coordinates.length_unit();
     let direction = direction.as_vec3().normalize();
     let hit = nearest(arrays, &ray_from(point, direction));
-    let along = |d: Vec3| exact.closest_hit(place.position, d.as_dvec3(), place.near, None);
+    let along = |d: Vec3| exact.closest_hit(at.position, d.as_dvec3(), at.near, None);
     let truth = along(direction);
-    let found = (hit.triangle != NOTHING)
+    let of_twin = (hit.triangle != NOTHING)
         .then(|| (arrays.triangles[hit.triangle as usize].index as usize, hit.front));
-    let is_same = |h: Option<Hit>| h.map(|h| (h.triangle, h.front)) == found;
+    let is_same = |h: Option<Hit>| h.map(|h| (h.triangle, h.front)) == of_twin;
     let is_as_far = |truth: &Hit| {
         // The direction is of unit length up to a rounding.
-        let most = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
-        (f64::from(hit.distance) * unit - truth.distance).abs() <= most
+        let limit = f64::from(hit.off) * unit + 4.0 * ROUNDING * truth.distance;
+        (f64::from(hit.distance) * unit - truth.distance).abs() <= limit
     };
     if is_same(truth) {
         assert!(truth.as_ref().is_none_or(is_as_far), "{what}: {hit:?}, {truth:?}");
@@ -260,13 +306,13 @@ fn differs(
 }
 
 /// The device's form of a point, without its rotation.
-fn traced(arrays: &TracedArrays, place: &GatherPoint) -> TracedPoint {
-    let [position, position_low] = arrays.coordinates.parts(place.position);
+fn traced(arrays: &TracedArrays, at: &GatherPoint) -> TracedPoint {
+    let [position, position_low] = arrays.coordinates.parts(at.position);
     TracedPoint {
         position,
-        near: arrays.coordinates.length(place.near),
+        near: arrays.coordinates.length(at.near),
         position_low,
-        normal: place.normal.as_vec3().to_array(),
+        normal: at.normal.as_vec3().to_array(),
         ..Default::default()
     }
 }
@@ -278,16 +324,16 @@ fn twin_ranks_lights_as_closed_forms_do() {
     for (name, mesh) in traced_scenes() {
         let lights = Lights::new(mesh.shared_scene());
         let arrays = TracedArrays::new(&lights);
-        for place in places(&mesh, 24) {
-            let point = traced(&arrays, &place);
-            for (number, truth) in lights.importance_ranked(&place) {
-                let found = factor_of(&arrays, &arrays.lights[number as usize], &point);
+        for at in gather_points(&mesh, 24) {
+            let point = traced(&arrays, &at);
+            for (number, truth) in lights.importance_ranked(&at) {
+                let actual = factor_of(&arrays, &arrays.lights[number as usize], &point);
                 // Near the horizon the visible part of a light is a sliver, with an error of a few
                 // roundings of the whole.
-                let most = 1e-4 * truth + 16.0 * ROUNDING;
+                let limit = 1e-4 * truth + 16.0 * ROUNDING;
                 assert!(
-                    (f64::from(found) - truth).abs() <= most,
-                    "{name}, light {number}, {place:?}: {found}, not {truth}"
+                    (f64::from(actual) - truth).abs() <= limit,
+                    "{name}, light {number}, {at:?}: {actual}, not {truth}"
                 );
             }
         }
@@ -300,20 +346,20 @@ fn twin_ranks_lights_as_closed_forms_do() {
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn gather_passes_equal_their_twins() {
-    let mut met = Met::default();
+    let mut cases = Cases::default();
     for (name, mesh) in gathered_scenes() {
-        compare(name, &Passes::new(&mesh, 7, 256), &mut met);
+        compare(name, &Passes::new(&mesh, 7, 256), &mut cases);
     }
-    println!("{met:?}");
+    println!("{cases:?}");
     // All cases to compare have occurred.
-    assert!(met.wide > 0 && met.folded > 0 && met.full > 0 && met.escaped > 0.0);
-    assert!(met.back > 0.0 && met.lamps > 0.0 && met.dim > 0 && met.rounds >= 6);
-    assert!(met.covered > 20 && met.near_by_field > 0.0);
+    assert!(cases.wide > 0 && cases.folded > 0 && cases.full > 0 && cases.escaped > 0.0);
+    assert!(cases.back > 0.0 && cases.lamps > 0.0 && cases.dim > 0 && cases.rounds >= 6);
+    assert!(cases.covered > 20 && cases.near_by_field > 0.0);
 }
 
 /// Cases that occurred in the scenes.
 #[derive(Debug, Default)]
-struct Met {
+struct Cases {
     /// Numbers of lights that rays over the hemisphere sample, of those that are not convex, and of
     /// points with the maximum number of lights sampled separately.
     wide: usize,
@@ -330,103 +376,87 @@ struct Met {
     rounds: usize,
 }
 
-fn compare(name: &str, passes: &Passes, met: &mut Met) {
+fn compare(name: &str, passes: &Passes, cases: &mut Cases) {
     let pipelines = passes.gpu.tracing.gather_pipelines(&passes.gpu.device);
     let bound = &passes.bound;
     let all = Groups::Count(passes.points.len() as u32);
-    passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
+    passes.run((&bound.rank_lights, &pipelines.rank_lights, all), &passes.whole());
     let mut states = passes.states();
-    compare_ranks(name, passes, &states, met);
+    compare_ranks(name, passes, &states, cases);
     let every: Vec<u32> = (0..passes.points.len() as u32).collect();
     let mut lists = [every.clone(), every];
     let mut round = 0;
     while lists.iter().any(|list| !list.is_empty()) {
         let what = format!("{name}, round {round}");
-        let first = round == 0;
-        let (rays, shadow_rays) = match first {
-            true => (
+        let [rays, paths, to_lights] = match round {
+            0 => [
                 (&bound.hemisphere_rays, &pipelines.hemisphere_rays, all),
+                (&bound.near_paths, &pipelines.near_paths, all),
                 (&bound.light_rays, &pipelines.light_rays, all),
-            ),
-            false => (
+            ],
+            _ => [
                 (&bound.more_hemisphere_rays, &pipelines.more_hemisphere_rays, Groups::Rays),
+                (&bound.more_near_paths, &pipelines.more_near_paths, Groups::Rays),
                 (&bound.more_light_rays, &pipelines.more_light_rays, Groups::ShadowRays),
-            ),
+            ],
         };
         // In several passes, the last of them not full; points of the list may have cast different
         // numbers of rays.
         let half = |of: &dyn Fn(&PointState) -> u32, list: &[u32]| {
             list.iter().map(|&p| of(&states[p as usize])).max().unwrap_or(0)
         };
-        let most = half(&|state| state.ray_count, &lists[0]);
-        let most_shadow = half(&|state| state.shadow_count, &lists[1]);
-        let parts = |most: u32| {
-            let len = most * 5 / 8 + 1;
-            (0..most).step_by(len as usize).map(move |from| (from, len))
+        let max_rays = half(&|state| state.ray_count, &lists[0]);
+        let max_shadow_rays = half(&|state| state.shadow_count, &lists[1]);
+        let parts = |max: u32| {
+            let len = max * 5 / 8 + 1;
+            (0..max).step_by(len as usize).map(move |from| (from, len))
         };
-        for (from, len) in parts(most) {
-            let settings = passes.settings(from, len);
-            passes.run((rays.0, rays.1), &settings, rays.2);
-            let after = passes.states();
-            let what = format!("{what}, rays from {from}");
-            compare_rays(&what, passes, &settings, &lists[0], [&states, &after]);
-            states = after;
+        for part in parts(max_rays) {
+            let what = format!("{what}, rays");
+            passes.step(what, rays, part, &lists[0], &mut states, compare_rays);
         }
-        let paths = match first {
-            true => (&bound.near_paths, &pipelines.near_paths, all),
-            false => (&bound.more_near_paths, &pipelines.more_near_paths, Groups::Rays),
-        };
         for &p in &lists[0] {
             let state = &states[p as usize];
             for (covered, sums) in covered_halves(state).into_iter().zip(&state.rays) {
-                met.covered += usize::from(covered);
-                met.near_by_field += if covered { 0.0 } else { sums.near };
+                cases.covered += usize::from(covered);
+                cases.near_by_field += if covered { 0.0 } else { sums.near };
             }
         }
         let path_rays = passes.gather.path_rays();
-        for from in (0..most).step_by(path_rays as usize) {
-            let settings = passes.settings(from, path_rays);
-            passes.run((paths.0, paths.1), &settings, paths.2);
-            let after = passes.states();
-            let what = format!("{what}, paths from {from}");
+        for from in (0..max_rays).step_by(path_rays as usize) {
+            let what = format!("{what}, paths");
             // Later rounds have more of the same, which takes minutes.
-            if round < 2 {
-                compare_paths(&what, passes, &settings, &lists[0], [&states, &after]);
-            }
-            states = after;
+            let compare = if round < 2 { compare_paths } else { |_: &Step| () };
+            passes.step(what, paths, (from, path_rays), &lists[0], &mut states, compare);
         }
         if passes.gather.has_lights() {
-            for (from, len) in parts(most_shadow) {
-                let settings = passes.settings(from, len);
-                passes.run((shadow_rays.0, shadow_rays.1), &settings, shadow_rays.2);
-                let after = passes.states();
-                let what = format!("{what}, rays to lights from {from}");
-                compare_shadow_rays(&what, passes, &settings, &lists[1], [&states, &after]);
-                states = after;
+            for part in parts(max_shadow_rays) {
+                let what = format!("{what}, rays to lights");
+                passes.step(what, to_lights, part, &lists[1], &mut states, compare_shadow_rays);
             }
         }
         let (after, samples, listed) = passes.settle(&passes.whole());
         compare_settled(&what, passes, &passes.whole(), [&states, &after], &samples, &listed);
         for sums in after.iter().flat_map(|state| &state.rays) {
-            met.escaped += sums.escaped;
-            met.back += sums.back;
-            met.lamps += sums.lamps[0];
+            cases.escaped += sums.escaped;
+            cases.back += sums.back;
+            cases.lamps += sums.lamps[0];
         }
         (states, lists) = (after, listed);
         round += 1;
-        met.rounds = met.rounds.max(round);
+        cases.rounds = cases.rounds.max(round);
     }
     // All have cast the maximum number of rays, unless these agree.
-    let most = passes.gather.max_rays;
+    let max = passes.gather.max_rays;
     let settled = passes.settle(&passes.whole()).1;
-    assert!(settled.iter().all(|s| s.rays == most || s.noise < 1e-5), "{name}: {settled:?}");
+    assert!(settled.iter().all(|s| s.rays == max || s.noise < 1e-5), "{name}: {settled:?}");
 }
 
 // ---------------------------------------------------------------------------------------------
 // Lights.
 
 /// Lights are the same, in the same order up to rounding of their irradiance.
-fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut Met) {
+fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], cases: &mut Cases) {
     let arrays = &passes.arrays;
     for (p, (point, state)) in passes.points.iter().zip(device).enumerate() {
         let what = format!("{name}, point {p}");
@@ -447,8 +477,8 @@ fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut M
             check(a.factor, factor_of(arrays, light, point), (off, 0.0), || what.clone());
             let of_twin = twin.ranked().iter().find(|other| other.light == a.light);
             assert_eq!(Some(a.is_wide), of_twin.map(|b| b.is_wide), "{what}: {a:?}, not {b:?}");
-            met.wide += a.is_wide as usize;
-            met.folded += usize::from(light.is_convex == 0);
+            cases.wide += a.is_wide as usize;
+            cases.folded += usize::from(light.is_convex == 0);
         }
         // Ties are ordered by number.
         for pair in state.ranked().windows(2) {
@@ -456,9 +486,9 @@ fn compare_ranks(name: &str, passes: &Passes, device: &[PointState], met: &mut M
                 |k: usize| irradiance_of(&arrays.lights[pair[k].light as usize], pair[k].factor);
             assert!(sent(0) > sent(1) || pair[0].light < pair[1].light, "{what}: {pair:?}");
         }
-        met.full += usize::from(state.light_count == 8);
+        cases.full += usize::from(state.light_count == 8);
         let all: f64 = (0..arrays.info.lights).map(irradiance).sum();
-        met.dim += (0..arrays.info.lights)
+        cases.dim += (0..arrays.info.lights)
             .filter(|&k| {
                 let sent = irradiance(k);
                 sent > 0.0 && sent <= f64::from(MIN_IRRADIANCE_SHARE) * all
@@ -492,16 +522,16 @@ fn factor_error(arrays: &TracedArrays, light: &TracedLight, point: &TracedPoint)
 // ---------------------------------------------------------------------------------------------
 // Rays over the hemisphere.
 
-/// Number of values in [`Found`], and the indices of the largest rays, others and near ones.
-const NUMBERS: usize = size_of::<Found>() / 4;
+/// Number of values in [`RayResult`], and the indices of the largest rays, others and near ones.
+const NUMBERS: usize = size_of::<RayResult>() / 4;
 const LARGEST: [usize; 2] = [9, 11];
 
-fn numbers(found: &Found) -> [f32; NUMBERS] {
-    bytemuck::cast(*found)
+fn numbers(result: &RayResult) -> [f32; NUMBERS] {
+    bytemuck::cast(*result)
 }
 
 /// Range of the possible results of rays.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 struct Spread {
     /// Width of the range of each value, over all rays; for the largest rays minimum and maximum.
     widths: [f64; NUMBERS],
@@ -511,14 +541,11 @@ struct Spread {
 }
 
 impl Spread {
-    const NONE: Spread =
-        Spread { widths: [0.0; NUMBERS], largest: [[0.0; 2]; 2], unsure: 0, rays: 0 };
-
     /// Adds one ray, whose result is within the range of these.
-    fn add(&mut self, found: &[[f32; NUMBERS]]) {
-        let mut low = found[0];
-        let mut high = found[0];
-        for other in found {
+    fn add(&mut self, results: &[[f32; NUMBERS]]) {
+        let mut low = results[0];
+        let mut high = results[0];
+        for other in results {
             for k in 0..NUMBERS {
                 low[k] = low[k].min(other[k]);
                 high[k] = high[k].max(other[k]);
@@ -540,52 +567,37 @@ impl Spread {
 
 /// Sums over rays are those of the twin, except for the rays that rounding may deflect: see
 /// [`shifts`].
-fn compare_rays(
-    what: &str,
-    passes: &Passes,
-    settings: &GatherSettings,
-    list: &[u32],
-    [before, after]: [&[PointState]; 2],
-) {
-    let rays = passes.rays();
-    let shifts = shifts();
-    let compare = |p: usize| {
-        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
-        let what = format!("{what}, point {p}");
-        if !list.contains(&(p as u32)) {
-            assert_eq!(was, is, "{what} is not listed");
-            return;
-        }
+fn compare_rays(step: &Step) {
+    let (rays, settings, shifts) = (step.passes.rays(), &step.settings, shifts());
+    step.compare(|what, point, was, is| {
         let mut twin = *was;
         rays.cast_rays(point, settings, &mut twin);
         let [from, middle, to] = range(was.ray_count, was, settings);
-        let mut spreads = [Spread::NONE; 2];
+        let mut spreads = [Spread::zeroed(); 2];
         for k in from..to {
             let direction = rays.direction(k, point);
-            let found = shifts.iter().map(|&(across, origin)| {
-                let low = (Vec3::from(point.position_low) + origin).to_array();
-                let shifted = TracedPoint { position_low: low, ..*point };
-                numbers(&rays.cast_ray(&shifted, turned_by(direction, across), was))
+            let results = shifts.iter().map(|&(across, origin)| {
+                let direction = turned_by(direction, across);
+                numbers(&rays.cast_ray(&shifted(point, origin), direction, was))
             });
-            spreads[usize::from(k >= middle)].add(&found.collect::<Vec<_>>());
+            spreads[usize::from(k >= middle)].add(&results.collect::<Vec<_>>());
         }
         for (half, spread) in spreads.iter().enumerate() {
             // A lane adds up its rays, then 64 lanes are added; a term takes some 40 operations.
             let roundings = spread.rays as f64 / 64.0 + 6.0 + 40.0;
             let of = |state: &PointState| {
-                let mut found = Found { sums: state.rays[half], ..Default::default() };
-                let visible = &state.visible[half * SOURCES..][..SOURCES - 1];
-                found.lights.copy_from_slice(visible);
-                numbers(&found)
+                let mut result = RayResult { sums: state.rays[half], ..Default::default() };
+                result.lights.copy_from_slice(&state.visible[half][..SUN]);
+                numbers(&result)
             };
-            let (found, expected) = (of(is), of(&twin));
+            let (actual, expected) = (of(is), of(&twin));
             for k in (0..NUMBERS).filter(|k| !LARGEST.contains(k)) {
                 let name = || format!("{what}, half {half}, number {k}");
-                check(found[k], expected[k], (spread.widths[k], roundings), name);
+                check(actual[k], expected[k], (spread.widths[k], roundings), name);
             }
             let before = of(was);
             for (range, k) in spread.largest.iter().zip(LARGEST) {
-                check_largest(found[k], range.map(|l| l.max(before[k])), || {
+                check_largest(actual[k], range.map(|l| l.max(before[k])), || {
                     format!("{what}, half {half}")
                 });
             }
@@ -601,13 +613,11 @@ fn compare_rays(
         }
         let rest = PointState { rays: is.rays, visible: is.visible, ..*was };
         assert_eq!(*is, rest, "{what}: nothing else is written");
-        for k in (0..SOURCES).filter(|&k| k == SUN || was.lights[k].is_wide == 0) {
-            for k in [k, k + SOURCES] {
-                assert_eq!(is.visible[k], was.visible[k], "{what}: light {k} is not wide");
-            }
+        for k in (0..=SUN).filter(|&k| k == SUN || was.lights[k].is_wide == 0) {
+            let visible = |state: &PointState| state.visible.map(|half| half[k]);
+            assert_eq!(visible(is), visible(was), "{what}: light {k} is not wide");
         }
-    };
-    (0..passes.points.len()).into_par_iter().for_each(compare);
+    });
 }
 
 /// Checks that the largest ray is within these, but for 40 roundings.
@@ -621,21 +631,12 @@ fn check_largest(largest: f32, [low, high]: [f32; 2], what: impl Fn() -> String)
 // Paths from near surfaces.
 
 /// Sums over paths are those of the twin, except for paths that rounding may deflect at any vertex.
-fn compare_paths(
-    what: &str,
-    passes: &Passes,
-    settings: &GatherSettings,
-    list: &[u32],
-    [before, after]: [&[PointState]; 2],
-) {
-    let rays = passes.rays();
-    let shifts = shifts();
-    let compare = |p: usize| {
-        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
-        let what = format!("{what}, point {p}");
+fn compare_paths(step: &Step) {
+    let (rays, settings, shifts) = (step.passes.rays(), &step.settings, shifts());
+    step.compare(|what, point, was, is| {
         let covered = covered_halves(was);
-        if !list.contains(&(p as u32)) || covered == [false; 2] {
-            assert_eq!(was, is, "{what} is not listed, or not covered");
+        if covered == [false; 2] {
+            assert_eq!(was, is, "{what} is not covered");
             return;
         }
         let mut twin = *was;
@@ -648,13 +649,13 @@ fn compare_paths(
             if !covered[half] {
                 continue;
             }
-            let found = shifts.iter().map(|&(across, origin)| {
+            let results = shifts.iter().map(|&(across, origin)| {
                 let shift = Shift { across, origin, turned: &turned_by };
                 near_paths::near_light(&rays, point, k, was, shift)
             });
-            let found: Vec<Vec3> = found.collect();
-            let low = found.iter().fold(found[0], |low, f| low.min(*f));
-            let high = found.iter().fold(found[0], |high, f| high.max(*f));
+            let results: Vec<Vec3> = results.collect();
+            let low = results.iter().copied().reduce(Vec3::min).unwrap();
+            let high = results.into_iter().reduce(Vec3::max).unwrap();
             for c in 0..3 {
                 // Rounding deflects every vertex in its own way, these all in the same way.
                 widths[half][c] += 2.0 * f64::from(high[c] - low[c]);
@@ -667,13 +668,13 @@ fn compare_paths(
         for half in 0..2 {
             // A term takes some 40 operations a vertex, of which there are some ten.
             let roundings = 64.0 + 6.0 + 400.0;
-            let (found, expected) = (is.rays[half].light, twin.rays[half].light);
-            for ((found, expected), width) in found.into_iter().zip(expected).zip(widths[half]) {
+            let (actual, expected) = (is.rays[half].light, twin.rays[half].light);
+            for ((actual, expected), width) in actual.into_iter().zip(expected).zip(widths[half]) {
                 let name = || format!("{what}, half {half}");
-                check(found, expected, (width, roundings), name);
+                check(actual, expected, (width, roundings), name);
             }
             let [low, high] = largest[half];
-            check_largest(is.rays[half].largest, [0.999 * low, 1.001 * high], || what.clone());
+            check_largest(is.rays[half].largest, [0.999 * low, 1.001 * high], || what.to_string());
         }
         // A path has some ten vertices with three rays each.
         assert!(unsure <= 3 + all / 20, "{what}: {unsure} of {all} are unsure");
@@ -682,27 +683,25 @@ fn compare_paths(
             (out.light, out.largest) = (sums.light, sums.largest);
         }
         assert_eq!(*is, rest, "{what}: nothing else is written");
-    };
-    (0..passes.points.len()).into_par_iter().for_each(compare);
+    });
 }
 
 /// Lights are chosen as often as the balance assumes.
 #[test]
 fn paths_choose_lights_with_their_chance() {
     for (name, mesh) in gathered_scenes() {
-        let lights = Lights::new(mesh.shared_scene());
-        let arrays = TracedArrays::new(&lights);
+        let arrays = TracedArrays::new(&Lights::new(mesh.shared_scene()));
         if arrays.info.lights == 0 {
             continue;
         }
         let settings = GatherSettings { min_rays: 256, ..Default::default() };
-        for place in places(&mesh, 5) {
-            let state = rank_lights(&arrays, &traced(&arrays, &place), &settings);
+        for at in gather_points(&mesh, 5) {
+            let state = rank_lights(&arrays, &traced(&arrays, &at), &settings);
             let mut counts = vec![0u32; arrays.info.lights as usize];
             let all = 1 << 14;
             for k in 0..all {
-                let at = (k as f32 + 0.5) / all as f32;
-                counts[choose_light(&arrays, &state, at) as usize] += 1;
+                let random = (k as f32 + 0.5) / all as f32;
+                counts[choose_light(&arrays, &state, random) as usize] += 1;
             }
             for (light, count) in (0..).zip(counts) {
                 let chance = f64::from(chance_of(&arrays, &state, light)) * f64::from(all);
@@ -715,20 +714,20 @@ fn paths_choose_lights_with_their_chance() {
 }
 
 /// Between plates that are closer than their elements are wide the device's light is that of rays
-/// on the CPU, within the noise of the paths: at each place there are many points so close together
-/// that they differ in nothing but their random numbers, and their spread tells the noise of their
+/// on the CPU, within the noise of the paths: around each of several centres there are 32 points so
+/// close together that only their random numbers differ, and their spread gives the noise of their
 /// mean.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
-    const POINTS: usize = 32;
+    let count = 32;
     let (gpu, mesh) = (gpu(), narrow_gap());
     let (corners, reflected) = random_radiosity(&mesh);
     let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
     let mut device = TracedGather::new(&gpu, &mesh, 1024).unwrap().with_near_field();
     let mut cpu = RayGather::new(&mesh, 1024).unwrap().with_near_field();
     let normals = [DVec3::Z, -DVec3::Z];
-    let places = [
+    let centres = [
         ([1.0, 1.0, 1e-4], 0),
         ([1.8, 0.6, 1e-4], 0),
         ([0.3, 1.3, 0.1499], 1),
@@ -738,44 +737,44 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
         ([1.3, 0.6, 0.1499], 1),
     ];
     let (mut squares, mut numbers) = (0.0, 0);
-    for (place, side) in places {
+    for (centre, side) in centres {
         let near_by = |k: usize| {
             let random = |j: usize| unit_interval(split_mix64_nth((3 * k + j) as u64)) - 0.5;
             // Over some hundred cells, each of which has rays and paths of its own.
             let shift = 4e-3 * DVec3::new(random(0), random(1), 0.0);
-            let position = DVec3::from_array(place) + shift;
+            let position = DVec3::from_array(centre) + shift;
             GatherPoint { position, normal: normals[side], near: 2.5e-5 }
         };
-        let points: Vec<GatherPoint> = (0..POINTS).map(near_by).collect();
+        let points: Vec<GatherPoint> = (0..count).map(near_by).collect();
         let traced: Vec<TracedPoint> = points.iter().map(|p| device.traced_point(p)).collect();
         let buffers =
             device.gpu.tracing.field(&device.scene, &field, || device.gpu.memory()).unwrap();
-        let found = device.gather_all(&buffers, &traced, MAX_POINTS).unwrap();
-        assert!(found.iter().all(|(_, is_covered)| *is_covered), "{place:?} is covered");
-        let found: Vec<IrradianceSample> = found.into_iter().map(|(sample, _)| sample).collect();
+        let actual = device.gather_all(&buffers, &traced, MAX_POINTS).unwrap();
+        assert!(actual.iter().all(|(_, is_covered)| *is_covered), "{centre:?} is covered");
+        let actual: Vec<IrradianceSample> = actual.into_iter().map(|(sample, _)| sample).collect();
         let expected = cpu.gather(&field, &points).unwrap();
-        let [found, expected] = [&found, &expected].map(|samples| {
+        let [actual, expected] = [&actual, &expected].map(|samples| {
             // Without what lights bring by themselves.
             let reflected = samples.iter().map(|s| s.irradiance - s.direct);
-            let mean = reflected.clone().sum::<Rgb>() / POINTS as f64;
+            let mean = reflected.clone().sum::<Rgb>() / count as f64;
             let sum: Rgb = reflected.map(|light| (light - mean) * (light - mean)).sum();
-            (mean, sum / (POINTS * (POINTS - 1)) as f64)
+            (mean, sum / (count * (count - 1)) as f64)
         });
-        let off = found.0 - expected.0;
-        let error = (found.1 + expected.1).map(f64::sqrt);
-        println!("{place:?}: {:.4} and {:.4}: {:.2} σ", found.0, expected.0, off / error);
+        let off = actual.0 - expected.0;
+        let error = (actual.1 + expected.1).map(f64::sqrt);
+        println!("{centre:?}: {:.4} and {:.4}: {:.2} σ", actual.0, expected.0, off / error);
         // Of 21 numbers with 31 degrees of freedom each one in 2000 goes beyond this by chance.
-        assert!((off.abs() / error).max_element() < 4.8, "{place:?}: {off} of {error}");
-        assert!(error.max_element() < 0.03 * expected.0.min_element(), "{place:?}: {error}");
+        assert!((off.abs() / error).max_element() < 4.8, "{centre:?}: {off} of {error}");
+        assert!(error.max_element() < 0.03 * expected.0.min_element(), "{centre:?}: {error}");
         squares += (off / error).length_squared();
         numbers += 3;
     }
-    // The channels of a place depend on each other: as few as a third of all are free.
+    // The channels at a centre depend on each other: as few as a third of all are free.
     println!("mean square {:.2}", squares / f64::from(numbers));
     assert!(squares / f64::from(numbers) < 2.5);
 }
 
-/// Paths on the device meet no luminaires: of a scene with some, points that near surfaces cover
+/// Paths on the device sample no luminaires: of a scene with some, points that near surfaces cover
 /// are gathered on the CPU, and the others are not.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
@@ -797,11 +796,11 @@ fn covered_points_under_luminaires_are_gathered_on_the_cpu() {
         let device = TracedGather::with_noise(&gpu, &mesh, 256, noise, 0.1).unwrap();
         let mut device = device.with_near_field();
         let mut cpu = RayGather::new(&mesh, 256).unwrap().with_noise(noise, 0.1).with_near_field();
-        let found = device.gather(&field, &points).unwrap();
+        let actual = device.gather(&field, &points).unwrap();
         let expected = cpu.gather(&field, &points).unwrap();
-        assert_eq!(found[0], expected[0]);
-        assert_ne!(found[1], expected[1]);
-        assert!(found[1].irradiance.distance(expected[1].irradiance) < 1e-3);
+        assert_eq!(actual[0], expected[0]);
+        assert_ne!(actual[1], expected[1]);
+        assert!(actual[1].irradiance.distance(expected[1].irradiance) < 1e-3);
     }
 }
 
@@ -810,22 +809,9 @@ fn covered_points_under_luminaires_are_gathered_on_the_cpu() {
 
 /// The visible part of each light is that of the twin, except for rays that rounding may deflect,
 /// or move to another texel of a mask.
-fn compare_shadow_rays(
-    what: &str,
-    passes: &Passes,
-    settings: &GatherSettings,
-    list: &[u32],
-    [before, after]: [&[PointState]; 2],
-) {
-    let arrays = &passes.arrays;
-    let shifts = shifts();
-    let compare = |p: usize| {
-        let (point, was, is) = (&passes.points[p], &before[p], &after[p]);
-        let what = format!("{what}, point {p}");
-        if !list.contains(&(p as u32)) {
-            assert_eq!(was, is, "{what} is not listed");
-            return;
-        }
+fn compare_shadow_rays(step: &Step) {
+    let (arrays, settings, shifts) = (&step.passes.arrays, &step.settings, shifts());
+    step.compare(|what, point, was, is| {
         let mut twin = *was;
         light_rays::cast_rays(arrays, point, settings, &mut twin);
         let [from, middle, to] = range(was.shadow_count, was, settings);
@@ -836,9 +822,8 @@ fn compare_shadow_rays(
                 let at = rotated_sobol(i, point);
                 // Points move as directions do: a light is no wider than the hemisphere. Those of
                 // the sun are rotated, since it is far smaller.
-                let found = shifts.iter().map(|&(across, origin)| {
-                    let low = (Vec3::from(point.position_low) + origin).to_array();
-                    let shifted = TracedPoint { position_low: low, ..*point };
+                let results = shifts.iter().map(|&(across, origin)| {
+                    let shifted = shifted(point, origin);
                     if source == SUN {
                         let direction = turned_by(towards_sun(arrays, at), across);
                         return light_rays::to_sun(arrays, &shifted, direction);
@@ -846,9 +831,9 @@ fn compare_shadow_rays(
                     let moved = (at + across).clamp(Vec2::ZERO, Vec2::ONE);
                     light_rays::cast_ray(arrays, &shifted, was, source, moved)
                 });
-                let found: Vec<_> = found.collect();
-                let low = found.iter().fold(found[0], |low, f| low.min(*f));
-                let high = found.iter().fold(found[0], |high, f| high.max(*f));
+                let results: Vec<Vec4> = results.collect();
+                let low = results.iter().copied().reduce(Vec4::min).unwrap();
+                let high = results.into_iter().reduce(Vec4::max).unwrap();
                 let half = usize::from(i >= middle);
                 rays[half] += 1;
                 for k in 0..4 {
@@ -858,13 +843,12 @@ fn compare_shadow_rays(
             }
             for (half, widths) in widths.iter().enumerate() {
                 let roundings = f64::from(rays[half]) / 64.0 + 6.0 + 40.0;
-                let k = half * SOURCES + source;
-                let (found, expected) = (is.visible[k], twin.visible[k]);
-                let numbers = found.seen.into_iter().chain([found.all]);
+                let (actual, expected) = (is.visible[half][source], twin.visible[half][source]);
+                let numbers = actual.seen.into_iter().chain([actual.all]);
                 let numbers = numbers.zip(expected.seen.into_iter().chain([expected.all]));
-                for ((found, expected), &width) in numbers.zip(widths) {
+                for ((actual, expected), &width) in numbers.zip(widths) {
                     let name = || format!("{what}, half {half}, light {source}");
-                    check(found, expected, (width, roundings), name);
+                    check(actual, expected, (width, roundings), name);
                 }
             }
             // A point is near an outline, or a side of a texel, as rarely as a ray is; near the
@@ -876,13 +860,12 @@ fn compare_shadow_rays(
         let mut rest = PointState { visible: is.visible, ..*was };
         assert_eq!(*is, rest, "{what}: nothing else is written");
         for source in light_rays::sources(arrays, was) {
-            for k in [source, source + SOURCES] {
-                rest.visible[k] = was.visible[k];
+            for half in 0..2 {
+                rest.visible[half][source] = was.visible[half][source];
             }
         }
         assert_eq!(rest, *was, "{what}: no other light is written");
-    };
-    (0..passes.points.len()).into_par_iter().for_each(compare);
+    });
 }
 
 /// Objects in a light's own plane do not hide it, whichever of both rounding puts first.
@@ -893,13 +876,13 @@ fn rays_to_lights_end_at_their_plane() {
     let (pipelines, bound) =
         (passes.gpu.tracing.gather_pipelines(&passes.gpu.device), &passes.bound);
     let all = Groups::Count(40);
-    passes.run((&bound.rank_lights, &pipelines.rank_lights), &passes.whole(), all);
-    passes.run((&bound.light_rays, &pipelines.light_rays), &passes.whole(), all);
+    passes.run((&bound.rank_lights, &pipelines.rank_lights, all), &passes.whole());
+    passes.run((&bound.light_rays, &pipelines.light_rays, all), &passes.whole());
     let mut lit = 0;
     for (point, state) in passes.points.iter().zip(passes.states()) {
         let mut twin = rank_lights(&passes.arrays, point, &passes.whole());
         light_rays::cast_rays(&passes.arrays, point, &passes.whole(), &mut twin);
-        for visible in [state, twin].iter().flat_map(|state| &state.visible) {
+        for visible in [state, twin].iter().flat_map(|state| state.visible.as_flattened()) {
             assert_eq!(visible.seen, [visible.all; 3], "{point:?}");
             lit += usize::from(visible.all > 0.0);
         }
@@ -953,27 +936,27 @@ fn compare_settled(
 
 /// All terms are positive: some 40 roundings of the sum, which is as long as any channel; the noise
 /// is a difference of halves, either of which may be twice their mean.
-fn compare_samples(what: &str, found: &Sample, settled: &Settled) {
+fn compare_samples(what: &str, actual: &Sample, settled: &Settled) {
     let expected = &settled.sample;
     let whole = f64::from(Vec3::from(expected.irradiance).length());
     let width = 40.0 * ROUNDING * whole;
-    let vectors = [(found.irradiance, expected.irradiance), (found.direct, expected.direct)];
-    for (found, expected) in vectors {
-        for (a, b) in found.into_iter().zip(expected) {
+    let vectors = [(actual.irradiance, expected.irradiance), (actual.direct, expected.direct)];
+    for (actual, expected) in vectors {
+        for (a, b) in actual.into_iter().zip(expected) {
             check(a, b, (width, 0.0), || what.to_string());
         }
     }
-    check(found.noise, expected.noise, (4.0 * width, 0.0), || format!("{what}, noise"));
+    check(actual.noise, expected.noise, (4.0 * width, 0.0), || format!("{what}, noise"));
     let shares = [
-        (found.escaped, expected.escaped),
-        (found.back, expected.back),
-        (found.inverse_distance, expected.inverse_distance),
+        (actual.escaped, expected.escaped),
+        (actual.back, expected.back),
+        (actual.inverse_distance, expected.inverse_distance),
     ];
-    for (found, expected) in shares {
+    for (actual, expected) in shares {
         // A sum and a division, with an error of three roundings.
-        check(found, expected, (0.0, 8.0), || format!("{what}, share"));
+        check(actual, expected, (0.0, 8.0), || format!("{what}, share"));
     }
-    assert_eq!([found.rays, found.shadow_rays], [expected.rays, expected.shadow_rays], "{what}");
+    assert_eq!([actual.rays, actual.shadow_rays], [expected.rays, expected.shadow_rays], "{what}");
 }
 
 /// States of all kinds, in several workgroups: with an allowed noise so high that many points
@@ -1031,7 +1014,7 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
         (light.factor, light.is_wide) = (0.2 * random(), u32::from(random() < 0.3));
     }
     for sums in &mut state.rays {
-        let mut term = |most: f32| rays * most * (1.0 + apart * random());
+        let mut term = |mean: f32| rays * mean * (1.0 + apart * random());
         sums.light = [term(0.3), term(0.2), term(0.4)];
         sums.lamps = [term(0.1), term(0.1), term(0.05)];
         (sums.escaped, sums.back) = (term(0.1).floor(), term(0.1).floor());
@@ -1042,7 +1025,7 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
         sums.near_light = [(); 3].map(|_| sums.near * random());
         sums.near_largest = random();
     }
-    for visible in &mut state.visible {
+    for visible in state.visible.as_flattened_mut() {
         visible.all = 1.0 + random();
         visible.seen = [(); 3].map(|_| visible.all * (1.0 - apart * random()));
     }
@@ -1052,16 +1035,16 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
 // ---------------------------------------------------------------------------------------------
 // The same bits.
 
-/// Gathers at these points, at most `most` at once.
+/// Gathers at these points, at most `max` at once.
 fn gathered(
     gather: &mut TracedGather,
     field: &RadiosityField,
     points: &[GatherPoint],
-    most: u32,
+    max: u32,
 ) -> Vec<IrradianceSample> {
     let traced: Vec<TracedPoint> = points.iter().map(|p| gather.traced_point(p)).collect();
     let buffers = gather.gpu.tracing.field(&gather.scene, field, || gather.gpu.memory()).unwrap();
-    let samples = gather.gather_all(&buffers, &traced, most).unwrap();
+    let samples = gather.gather_all(&buffers, &traced, max).unwrap();
     samples.into_iter().map(|(sample, _)| sample).collect()
 }
 
@@ -1075,13 +1058,13 @@ fn gathers_have_the_same_bits_in_any_batches() {
         let new =
             || TracedGather::with_noise(&gpu, &mesh, 64, 0.05, 0.1).unwrap().with_near_field();
         // More batches of 64 than are in flight at once.
-        let points = places(&mesh, 200);
+        let points = gather_points(&mesh, 200);
         let mut gather = new();
         let all = gathered(&mut gather, &field, &points, MAX_POINTS);
         assert!(all.iter().any(|sample| sample.noise > 0.0));
-        for most in [MAX_POINTS, 64, 23] {
-            let again = gathered(&mut gather, &field, &points, most);
-            assert!(again == all, "{name}: batches of {most}");
+        for max in [MAX_POINTS, 64, 23] {
+            let again = gathered(&mut gather, &field, &points, max);
+            assert!(again == all, "{name}: batches of {max}");
         }
         assert!(new().gather(&field, &points).unwrap() == all, "{name}: another gather");
         for k in (0..200).step_by(41) {
@@ -1098,14 +1081,14 @@ fn many_rays_are_cast_in_several_passes() {
     let (gpu, mesh) = (gpu(), under_sky_and_sun());
     let (corners, reflected) = random_radiosity(&mesh);
     let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &reflected };
-    let points = places(&mesh, 5);
+    let points = gather_points(&mesh, 5);
     let few = TracedGather::new(&gpu, &mesh, PASS_RAYS).unwrap().gather(&field, &points).unwrap();
     let mut gather = TracedGather::new(&gpu, &mesh, 16 * PASS_RAYS).unwrap();
     let many = gather.gather(&field, &points).unwrap();
     assert_eq!(gather.rays(), 5 * u64::from(16 * PASS_RAYS + 4 * PASS_RAYS));
     for (a, b) in few.iter().zip(&many) {
         // Standard error of stratified samples: less than that of independent ones, 1/√n each.
-        let most = 4.0 / f64::from(PASS_RAYS).sqrt() * b.irradiance.length();
-        assert!(a.irradiance.distance(b.irradiance) <= most, "{a:?}, not {b:?}");
+        let limit = 4.0 / f64::from(PASS_RAYS).sqrt() * b.irradiance.length();
+        assert!(a.irradiance.distance(b.irradiance) <= limit, "{a:?}, not {b:?}");
     }
 }

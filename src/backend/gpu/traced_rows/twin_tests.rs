@@ -8,7 +8,7 @@ use super::*;
 use crate::backend::cpu::twins::compact_rows::compact_rows;
 use crate::backend::cpu::twins::row_rays::{RowRays, amount};
 use crate::backend::cpu::twins::trace::turned;
-use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_A_LINE};
+use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_PER_LINE};
 use crate::backend::gpu::test_support::{
     gpu, on_sides, read_buffer, room_with_doubled_leaf, shifts, traced_scenes, turned_by,
 };
@@ -53,7 +53,7 @@ fn row_rays_equal_their_twin() {
     let (mut open, mut back, mut dimmed) = (0, 0, 0);
     for (name, mesh) in traced_scenes() {
         // Some lanes idle; directions in two lines of their texture.
-        let count = TEXELS_A_LINE + 500;
+        let count = TEXELS_PER_LINE + 500;
         let mut rows = open_rows(&gpu, &mesh, count);
         let lights = Lights::new(mesh.shared_scene());
         let (arrays, quadtrees) = (TracedArrays::new(&lights), quadtrees(&mesh));
@@ -64,8 +64,8 @@ fn row_rays_equal_their_twin() {
         let mut traced: Vec<TracedPatch> =
             patches(&mesh).iter().map(|&patch| rows.traced_patch(&mesh, patch)).collect();
         // One above its own triangle that does not see the triangle in front of it.
-        let met = |k: u32| twin.met(&traced[0], twin.direction(k, &traced[0])).1.triangle;
-        let before = (0..count).map(met).find(|&triangle| triangle != NOTHING).unwrap();
+        let hit = |k: u32| twin.intersect(&traced[0], twin.direction(k, &traced[0])).1.triangle;
+        let before = (0..count).map(hit).find(|&triangle| triangle != NOTHING).unwrap();
         let own_triangle = arrays.triangles[before as usize].index;
         let lifted = Vec3::from(traced[0].position) + 1e-3 * Vec3::from(traced[0].normal);
         traced.push(TracedPatch { position: lifted.to_array(), own_triangle, ..traced[0] });
@@ -77,49 +77,50 @@ fn row_rays_equal_their_twin() {
             let what = format!("{name}, patch {k}");
             let expected = twin.row_rays(patch, &settings);
             assert_eq!(expected.len(), channels * slots);
-            let mut found = vec![0; channels * slots];
+            let mut actual = vec![0; channels * slots];
             for entry in entries.iter().filter(|entry| entry.patch_ == k as u32) {
-                found[entry.slot as usize] = entry.count;
+                actual[entry.slot as usize] = entry.count;
                 for channel in 0..channels - 1 {
-                    found[(channel + 1) * slots + entry.slot as usize] = entry.passed[channel];
+                    actual[(channel + 1) * slots + entry.slot as usize] = entry.passed[channel];
                 }
             }
-            assert_eq!(found[..slots].iter().sum::<u32>(), count, "{what}");
+            assert_eq!(actual[..slots].iter().sum::<u32>(), count, "{what}");
             // Range of each number.
             let (mut low, mut high) = (vec![0; channels * slots], vec![0; channels * slots]);
             let mut unsure = 0;
             for ray in 0..count {
                 let direction = twin.direction(ray, patch);
-                let may_find = |&(across, origin): &(Vec2, Vec3)| {
+                let possible = |&(across, origin): &(Vec2, Vec3)| {
                     let at = (Vec3::from(patch.position_low) + origin).to_array();
                     let shifted = TracedPatch { position_low: at, ..*patch };
                     twin.cast_ray(&shifted, turned_by(direction, across))
                 };
-                let found: Vec<(u32, Vec3)> = shifts.iter().map(may_find).collect();
-                let is_sure = found.iter().all(|other| other.0 == found[0].0);
+                let results: Vec<(u32, Vec3)> = shifts.iter().map(possible).collect();
+                let is_sure = results.iter().all(|other| other.0 == results[0].0);
                 unsure += u32::from(!is_sure);
                 let mut seen = vec![];
-                for &(slot, _) in &found {
+                for &(slot, _) in &results {
                     if seen.contains(&slot) {
                         continue;
                     }
                     seen.push(slot);
-                    let shares = found.iter().filter(|other| other.0 == slot).map(|other| other.1);
-                    let most = shares.clone().fold(Vec3::ZERO, Vec3::max);
-                    let least = shares.fold(Vec3::ONE, Vec3::min);
+                    let shares =
+                        results.iter().filter(|other| other.0 == slot).map(|other| other.1);
+                    let max = shares.clone().fold(Vec3::ZERO, Vec3::max);
+                    let min = shares.fold(Vec3::ONE, Vec3::min);
                     let slot = slot as usize;
                     high[slot] += 1;
                     low[slot] += u32::from(is_sure);
                     for channel in 0..channels - 1 {
                         let at = (channel + 1) * slots + slot;
-                        high[at] += amount(most[channel], &settings) + 1;
-                        let least = amount(least[channel], &settings).saturating_sub(1);
-                        low[at] += if is_sure { least } else { 0 };
+                        high[at] += amount(max[channel], &settings) + 1;
+                        let min = amount(min[channel], &settings).saturating_sub(1);
+                        low[at] += if is_sure { min } else { 0 };
                     }
                 }
             }
             for k in 0..channels * slots {
-                let (n, row) = (found[k], k / slots);
+                let (n, row) = (actual[k], k / slots);
                 assert!(
                     (low[k]..=high[k]).contains(&n),
                     "{what}, slot {} of row {row}: {n}, not {} to {}; the twin has {}",
@@ -132,16 +133,16 @@ fn row_rays_equal_their_twin() {
             // Some hundred sides of triangles and elements, a radian long each, are within 2⁻²⁰ of
             // 2e-4 of all rays.
             assert!(unsure * 200 < count, "{what}: {unsure} of {count} rays are unsure");
-            (open, back) = (open + found[OPEN as usize], back + found[BACK as usize]);
+            (open, back) = (open + actual[OPEN as usize], back + actual[BACK as usize]);
             dimmed += (0..slots * usize::from(channels > 1))
-                .filter(|&k| found[slots + k] > 0 && found[slots + k] != found[2 * slots + k])
+                .filter(|&k| actual[slots + k] > 0 && actual[slots + k] != actual[2 * slots + k])
                 .count();
         }
         // Counts are zero for the next batch.
         let counts: Vec<u32> = read_buffer(&gpu, &rows.buffers.counts);
         assert!(counts.iter().all(|&count| count == 0), "{name}");
     }
-    println!("{open} rays meet nothing, {back} backs; {dimmed} slots lie behind coloured glass");
+    println!("{open} rays hit nothing, {back} backs; {dimmed} slots lie behind coloured glass");
     assert!(open > 0 && back > 0 && dimmed > 0);
 }
 
@@ -192,7 +193,7 @@ fn compact_rows_equals_its_twin() {
     let gpu = gpu();
     for (name, mesh) in traced_scenes() {
         let mut rows = open_rows(&gpu, &mesh, 1000);
-        // The number of slots of the mesh, one for each lane, and several for most.
+        // The number of slots of the mesh, one for each lane, and several for almost all lanes.
         for slots in [rows.slots, 256, 1001] {
             compare_entries(&format!("{name}, {slots} slots"), &gpu, &mut rows, slots);
         }
@@ -226,28 +227,28 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     write();
     // No ray is cast.
     let settings = RowSettings { slots: slot_count, ..rows.settings(0) };
-    let found = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
+    let actual = rows.entries(&patches, settings, 0, <[_]>::to_vec).unwrap().unwrap();
     // Rows come in any order, the entries of each in the order of slots.
-    let in_rows = found.chunk_by(|a, b| a.patch_ == b.patch_);
+    let in_rows = actual.chunk_by(|a, b| a.patch_ == b.patch_);
     assert_eq!(in_rows.clone().count(), patches.len(), "{what}");
     assert!(in_rows.into_iter().all(|row| row.is_sorted_by_key(|e| e.slot)), "{what}");
     let mut left = counts.clone();
     let expected = compact_rows(&mut left, &settings, rows.has_panes);
     assert!(expected.len() > 2 * patches.len());
-    assert!(words(&sorted(found)) == words(&sorted(expected.clone())), "{what}");
+    assert!(words(&sorted(actual)) == words(&sorted(expected.clone())), "{what}");
     let on_device = || read_buffer::<u32>(gpu, &on_device);
     assert!(on_device()[..left.len()] == left && left.iter().all(|&n| n == 0), "{what}");
 
     // Capacity for two thirds of them; the memory beyond keeps its zeros.
     let room = expected.len() * 2 / 3;
     let nothing = vec![0; size_of_val(&expected[..])];
-    gpu.queue.write_buffer(&rows.buffers.compacted.found, ROW_ENTRIES_HEADER_BYTES, &nothing);
+    gpu.queue.write_buffer(&rows.buffers.compacted.list, ROW_ENTRIES_HEADER_BYTES, &nothing);
     write();
     let settings = RowSettings { entries: room as u32, ..settings };
     assert!(rows.entries(&patches, settings, 0, |_| ()).unwrap().is_none(), "{what}");
-    let found: Vec<u32> = read_buffer(gpu, &rows.buffers.compacted.found);
-    assert_eq!(found[0] as usize, expected.len(), "{what}");
-    let (written, beyond) = entries_in(&found)[..expected.len()].split_at(room);
+    let actual: Vec<u32> = read_buffer(gpu, &rows.buffers.compacted.list);
+    assert_eq!(actual[0] as usize, expected.len(), "{what}");
+    let (written, beyond) = entries_in(&actual)[..expected.len()].split_at(room);
     let expected: FxHashSet<[u32; 8]> = expected.iter().map(|e| bytemuck::cast(*e)).collect();
     let is_expected = |e: &RowEntry| expected.contains::<[u32; 8]>(&bytemuck::cast(*e));
     assert!(written.iter().all(is_expected), "{what}");
@@ -259,8 +260,8 @@ fn words(entries: &[RowEntry]) -> &[u32] {
     bytemuck::cast_slice(entries)
 }
 
-fn entries_in(found: &[u32]) -> &[RowEntry] {
-    bytemuck::cast_slice(&found[ROW_ENTRIES_HEADER_BYTES as usize / 4..])
+fn entries_in(actual: &[u32]) -> &[RowEntry] {
+    bytemuck::cast_slice(&actual[ROW_ENTRIES_HEADER_BYTES as usize / 4..])
 }
 
 #[test]
@@ -277,7 +278,7 @@ fn rows_have_the_same_bits_in_any_batches() {
             assert!(alone == all[k..=k], "{name}: patch {k} alone");
         }
         // Batches that exceed the capacity are made in two.
-        rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_ELEMENT;
+        rows.buffers.compacted.entries = mesh.element_count() as u32 + FIRST_FRONT;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: in halves");
         rows.buffers.patches_at_once = 3;
         assert!(rows.rows(&mesh, &patches, 1.0).unwrap() == all, "{name}: three at once");
