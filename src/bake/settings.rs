@@ -45,8 +45,6 @@ pub struct SolveSettings {
     /// Materials, by their index, whose emission is not shot: each element gathers it. For lights
     /// most of whose light falls on nothing that reflects, such as a sky.
     pub gathered_materials: Vec<u32>,
-    /// Quadtree levels by which elements are split that other surfaces touch.
-    pub contact_levels: u32,
     /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a
     /// half or a quarter of them for dimmer ones. Where rays are cast, the square root of their
     /// number. A device casts rays too where these take less time: see
@@ -135,7 +133,6 @@ impl BakeSettings {
         let survey = LightSurvey::new(scene);
         let mut settings = BakeSettings::by_survey(0.02, &survey, scene);
         settings.solve.element_size = settings.solve.element_size.max(survey.diagonal / 32.0);
-        settings.solve.contact_levels = 3;
         settings.solve.hemicube_resolution = 128;
         settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
         settings.gather = None;
@@ -195,7 +192,6 @@ impl BakeSettings {
                 * model::SHOOTING_EDGE.setting(e).max(model::COARSE_SHOOTING_EDGE.setting(e)),
             region: survey.region,
             gathered_materials: survey.gathered_materials.clone(),
-            contact_levels: 0,
             hemicube_resolution: model::hemicube_resolution(e),
             full_resolution_share: None,
             near_reach: model::NEAR_REACH,

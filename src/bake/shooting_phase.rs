@@ -1,8 +1,7 @@
 //! The first phase of a bake: light is shot on elements.
 //!
-//! The scene is cut into elements, more finely where surfaces touch. Rows of form factors come from
-//! the backend and are corrected for near receivers; a solver sends light along them. Given a
-//! checkpoint file the solve goes on from it.
+//! The scene is cut into elements. Rows of form factors come from the backend and are corrected for
+//! near receivers; a solver sends light along them. Given a checkpoint file the solve resumes it.
 //!
 //! ```text
 //! backend ─► ProximityCorrection ─► Solver ─► radiosity of elements
@@ -62,8 +61,7 @@ pub(super) fn shoot(
     clock: &mut StageClock,
 ) -> Result<ShotLight, Error> {
     let sizing = settings.sizing(scene, settings.element_size);
-    let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?
-        .split_at_contacts(settings.contact_levels);
+    let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?;
     let rows = backend.rows(&mesh, settings)?;
     let mut rows = ProximityCorrection::new(rows, &mesh, settings.near_reach);
     clock.timings.mesh = clock.lap();
