@@ -36,7 +36,7 @@ mod gather_phase;
 mod in_time;
 mod judge;
 mod light_survey;
-pub mod model;
+pub(crate) mod model;
 mod outcome;
 mod pipeline;
 mod progress;

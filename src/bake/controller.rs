@@ -1,4 +1,4 @@
-//! What is refined after an estimate, by the [model](crate::bake::model) of error and cost.
+//! What is refined after an estimate, by the [model] of error and cost.
 
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
@@ -104,17 +104,19 @@ impl Step {
 
 /// The noise tolerance of vertices where `target` is asked for.
 pub(super) fn noise_tolerance(target: f64) -> f64 {
-    model::OUTLIER_FACTOR * model::SAMPLING_SHARE * model::allowed_error(target)
+    // Vertices whose rays disagree by three times the error allowed for sampling get more of them.
+    3.0 * model::allowed_sampling(target)
 }
 
 /// `gather` with as many rays as bring `sampling`, the error of those it has, down to its share of
 /// the `target`.
 pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64) -> GatherSettings {
-    let allowed = model::SAMPLING_SHARE * model::allowed_error(target);
+    let allowed = model::allowed_sampling(target);
     let rays = f64::from(gather.rays) * model::ray_factor(sampling, allowed);
     let mut chosen = gather.clone();
     // They come in powers of two; too few would have all vertices gather again.
-    chosen.rays = (model::clamped(rays, model::RAYS).ceil() as u32).next_power_of_two();
+    let rays = rays.clamp(*model::RAYS.start(), *model::RAYS.end());
+    chosen.rays = (rays.ceil() as u32).next_power_of_two();
     chosen.noise_tolerance = noise_tolerance(target);
     chosen
 }
@@ -234,7 +236,7 @@ impl Steps {
             sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
             mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
-            bounce: bounces > cap || saved > model::BOUNCE_COST,
+            bounce: bounces > cap || saved > 1.0 / f64::from(model::COARSE_RAY_DIVISOR),
         }
     }
 
@@ -379,7 +381,7 @@ mod tests {
             let new = refined(&gather, judged(&met, &groups), &target);
             if each_group {
                 let factors = &new.refinement.group_factors;
-                assert_eq!(factors[..], [1.0, 1.0, 1.0, model::MIN_MESH_STEP]);
+                assert_eq!(factors[..], [1.0, 1.0, 1.0, 0.5]);
             } else {
                 assert_eq!(new, gather);
             }
@@ -397,7 +399,7 @@ mod tests {
     #[test]
     fn pilot_chooses_rays_by_sampling_law() {
         let gather = settings();
-        let allowed = model::SAMPLING_SHARE * model::allowed_error(0.02);
+        let allowed = model::allowed_sampling(0.02);
         let rays = |sampling: f64| with_rays_for(&gather, sampling, 0.02).rays;
         assert_eq!(rays(allowed), gather.rays.next_power_of_two());
         for sampling in [1.2, 2.0, 4.0, 9.0].map(|times| times * allowed) {

@@ -26,8 +26,11 @@
 use glam::DVec3;
 
 use crate::accuracy::tail::{Ranking, Trimmed};
-use crate::bake::model;
 use crate::scene::Rgb;
+
+/// Variance of the mean of two gathers over that of one, and of the linear interpolant between three
+/// vertices of independent errors over that of one of them (∫ Σ λᵢ² over a triangle = 1/2).
+pub(super) const AVERAGED_VARIANCE: f64 = 0.5;
 
 /// An estimate of the error of vertex radiosity.
 ///
@@ -277,7 +280,7 @@ fn split_off_tail(strata: &mut [StratumDeviations], further: &FurtherBounces, ta
 /// the gathers, as far as that is known.
 fn tail_square(stratum: &StratumDeviations, further: &FurtherBounces) -> f64 {
     let of_point = |d: &Deviation| {
-        let square = further.error_square(d) - model::HALF * d.noise;
+        let square = further.error_square(d) - AVERAGED_VARIANCE * d.noise;
         d.area * (1.0 - d.kept) * square.max(0.0)
     };
     stratum.deviations.iter().map(of_point).sum()
@@ -322,8 +325,10 @@ fn parts(
     let square = |d: &Deviation| d.interpolation.length_squared();
     // The largest errors are at rare points.
     let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
-    let interpolation = (squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares);
-    let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
+    // A difference of two estimates may be negative: a tenth of the squares remains, and of that 0.3
+    // are the mesh's, whose own error noise hides.
+    let interpolation = (squares - AVERAGED_VARIANCE * noise).max(0.1 * squares);
+    let sampling = (AVERAGED_VARIANCE * noise).min(0.7 * interpolation);
     let mesh = interpolation - sampling;
     let area: f64 = strata.iter().map(StratumDeviations::area).sum();
     let area = area.max(f64::MIN_POSITIVE);

@@ -16,7 +16,7 @@ use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
-use crate::bake::judge::Judge;
+use crate::bake::judge::{self, Judge};
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
@@ -36,9 +36,6 @@ use crate::progress::StopReason;
 use crate::scene::{Rgb, Scene};
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 use crate::verify::octaves_of;
-
-/// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
-const CHECKPOINT_INTERVAL: u32 = 10;
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {
@@ -164,7 +161,8 @@ fn solve_with_checkpoints(
     let mut saving_time = Duration::ZERO;
     loop {
         let stop = session.advance(rows, &mut *progress)?;
-        if stop.is_some() || saved.elapsed() >= CHECKPOINT_INTERVAL * saving_time {
+        // A tenth of the time at most is for writing.
+        if stop.is_some() || saved.elapsed() >= 10 * saving_time {
             let start = Instant::now();
             session.save(path)?;
             saved = Instant::now();
@@ -200,8 +198,7 @@ pub(super) fn estimate_elements(
         expected_floor: light.radiosity_field().radiosity_floor(settings.measure.floor),
         paths: None,
     };
-    let counts =
-        SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };
+    let counts = SampleCounts { total: model::MIN_SAMPLES, per_group: model::SAMPLES_PER_GROUP };
     // With settings to gather by, it was cancelled before vertices could.
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
     let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
@@ -214,7 +211,7 @@ pub(super) fn estimate_elements(
             Judge::new(shot.mesh.scene(), settings.measure, target.each_group).judge(
                 found,
                 &light,
-                (Some(target.error), [model::JUDGE_PATHS; 2]),
+                (Some(target.error), [judge::MIN_PATHS; 2]),
                 &mut |_, _| ControlFlow::Continue(()),
             )
         }
