@@ -34,7 +34,6 @@ mod estimator;
 mod fallback;
 mod gather_phase;
 mod in_time;
-mod judge;
 mod light_survey;
 pub(crate) mod model;
 mod outcome;
@@ -47,6 +46,7 @@ mod shooting_phase;
 mod strata;
 mod target;
 mod to_error;
+mod validator;
 
 pub use error_estimate::{ErrorEstimate, GroupError};
 pub use outcome::{Obstacle, Outcome};

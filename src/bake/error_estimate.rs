@@ -21,15 +21,15 @@
 //! find, since light that is off in a gap of bright walls stays there. Light not shot is added as
 //! if it fell like the ambient term. This file does no gathering: see
 //! [`estimator`](super::estimator). Where the light that is gathered is itself off, no gather shows
-//! it; the [`judge`](super::judge) has paths for that.
+//! it; the [`validator`](super::validator) has paths for that.
 
 use glam::DVec3;
 
 use crate::accuracy::tail::{Ranking, Trimmed};
 use crate::scene::Rgb;
 
-/// Variance of the mean of two gathers over that of one, and of the linear interpolant between three
-/// vertices of independent errors over that of one of them (∫ Σ λᵢ² over a triangle = 1/2).
+/// Variance of the mean of two gathers over that of one, and of the linear interpolant between
+/// three vertices of independent errors over that of one of them (∫ Σ λᵢ² over a triangle = 1/2).
 pub(super) const AVERAGED_VARIANCE: f64 = 0.5;
 
 /// An estimate of the error of vertex radiosity.
@@ -325,8 +325,8 @@ fn parts(
     let square = |d: &Deviation| d.interpolation.length_squared();
     // The largest errors are at rare points.
     let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
-    // A difference of two estimates may be negative: a tenth of the squares remains, and of that 0.3
-    // are the mesh's, whose own error noise hides.
+    // A difference of two estimates may be negative: a tenth of the squares remains, and of that
+    // 0.3 are the mesh's, whose own error noise hides.
     let interpolation = (squares - AVERAGED_VARIANCE * noise).max(0.1 * squares);
     let sampling = (AVERAGED_VARIANCE * noise).min(0.7 * interpolation);
     let mesh = interpolation - sampling;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
-use crate::bake::controller::{ErrorTarget, Judged, cautious};
+use crate::bake::controller::{ErrorTarget, TargetErrors, cautious};
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::ProgressCallback;
@@ -72,7 +72,7 @@ pub(super) fn bake_in_time(
         };
         let is_reached = goal.is_some_and(|goal| {
             let BakeResult { estimate, groups, .. } = &baked;
-            goal.is_reached(Judged { whole: estimate, by_light: estimate, groups }, stopped)
+            goal.is_reached(TargetErrors { whole: estimate, by_light: estimate, groups }, stopped)
         });
         let short = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
         let outcome = match goal {
@@ -116,8 +116,8 @@ fn affordable_improvement(previous: Option<Attempt>, last: Attempt, remaining: f
     (0.8 * remaining / last.taken).powf(1.0 / exponent)
 }
 
-/// The largest error that is told of `baked`, each with one standard error: of the whole and, where
-/// each group counts, of these.
+/// The largest estimated error of `baked` plus one standard error: of the whole and, if
+/// `each_group`, of its groups.
 fn error_of(baked: &BakeResult, each_group: bool) -> f64 {
     let groups = baked.groups.iter().filter(|_| each_group).map(|group| &group.estimate);
     [&baked.estimate].into_iter().chain(groups).map(cautious).fold(0.0, f64::max)

@@ -13,17 +13,17 @@
 //!
 //! The model is used four times:
 //!
-//! 1. *Before:* [`BakeSettings::for_error`](crate::BakeSettings::for_error) computes settings from an
-//!    error by power laws.
+//! 1. *Before:* [`BakeSettings::for_error`](crate::BakeSettings::for_error) computes settings from
+//!    an error by power laws.
 //! 2. *After a pilot:* a few points that gather twice give the number of rays.
-//! 3. *After every estimate:* parts above `water_filling_cap` are lowered to it, each by its own law
-//!    in one step of bounded size.
+//! 3. *After every estimate:* parts above `water_filling_cap` are lowered to it, each by its own
+//!    law in one step of bounded size.
 //! 4. *Within a time:* cost = constant · error^−p gives the next error.
 //!
-//! Constants without another source were chosen on three scenes (`scenes/cornell_box.obj`, a room lit
-//! from the next room, a room with many small boxes) so that measured errors are at or below those
-//! asked for. Results depend on them by cost and by the number of rounds; the estimate decides when a
-//! bake ends.
+//! Constants without another source were chosen on three scenes (`scenes/cornell_box.obj`, a room
+//! lit from the next room, a room with many small boxes) so that measured errors are at or below
+//! those asked for. Results depend on them by cost and by the number of rounds; the estimate
+//! decides when a bake ends.
 //!
 //! `RADIOSITY_BENCH=full cargo bench --bench error_model [-- SCENE.obj …]` measures the laws. For
 //! `scenes/cornell_box.obj` with rays on the CPU, around an error of 5 %, it printed:
@@ -104,8 +104,8 @@ pub(super) const RQMC_EXPONENT: f64 = 0.75;
 /// their noise over all that it sees.
 pub(super) const COARSE_RAY_DIVISOR: u32 = 4;
 
-/// Rays of the rows by which `vertices` exchange further bounces, where each gathers with `rays`: at
-/// most 2^26 entries in total, 1 GiB.
+/// Rays of the rows by which `vertices` exchange further bounces, where each gathers with `rays`:
+/// at most 2^26 entries in total, 1 GiB.
 pub(super) fn rays_of_rows(rays: u32, vertices: usize) -> u32 {
     let most = ((1 << 26) / vertices.max(1)).max(1);
     rays.div_ceil(COARSE_RAY_DIVISOR).min(u32::try_from(most).unwrap_or(u32::MAX))
@@ -192,8 +192,8 @@ pub(super) fn noise_step(error: f64, cap: f64) -> f64 {
 }
 
 /// Factor of both tolerances of the mesh and of the shortest edge in a round, for the error of the
-/// mesh to fall from `error` to `cap`, in proportion: at least a half, since elements are not merged
-/// again.
+/// mesh to fall from `error` to `cap`, in proportion: at least a half, since elements are not
+/// merged again.
 pub(super) fn mesh_step(error: f64, cap: f64) -> f64 {
     (cap / error).clamp(0.5, 1.0 / MIN_STEP)
 }
@@ -203,8 +203,8 @@ pub(super) fn mesh_step(error: f64, cap: f64) -> f64 {
 /// Minimum number of random points of an estimate.
 pub(super) const MIN_SAMPLES: usize = 192;
 
-/// Random points for an estimate after `gathers` at vertices: one per 48 of these, which costs about
-/// a sixteenth of them since each point gathers three times.
+/// Random points for an estimate after `gathers` at vertices: one per 48 of these, which costs
+/// about a sixteenth of them since each point gathers three times.
 pub(super) fn sample_count(gathers: u64) -> usize {
     (gathers as usize / 48).clamp(MIN_SAMPLES, 1 << 14)
 }

@@ -16,7 +16,6 @@ use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
-use crate::bake::judge::{self, Judge};
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
@@ -25,6 +24,7 @@ use crate::bake::received_points::received_points;
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::bake::strata::SampleCounts;
+use crate::bake::validator::{self, Validator};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
@@ -201,24 +201,25 @@ pub(super) fn estimate_elements(
     let counts = SampleCounts { total: model::MIN_SAMPLES, per_group: model::SAMPLES_PER_GROUP };
     // With settings to gather by, it was cancelled before vertices could.
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
-    let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
+    let estimated = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
         estimator::goes_on(cancelled, samples)
     })?;
-    let found = match target {
-        // What is told of a bake that was stopped is to hold, too.
+    let estimated = match target {
+        // The estimate of a bake that was stopped is validated, too.
         Some(target) if cancelled => {
-            Judge::new(shot.mesh.scene(), settings.measure, target.each_group).judge(
-                found,
+            Validator::new(shot.mesh.scene(), settings.measure, target.each_group).validate(
+                estimated,
                 &light,
-                (Some(target.error), [judge::MIN_PATHS; 2]),
+                Some(target.error),
+                [validator::MIN_PATHS; 2],
                 &mut |_, _| ControlFlow::Continue(()),
             )
         }
-        _ => found,
+        _ => estimated,
     };
-    let is_reached = target.is_some_and(|target| target.is_reached(found.judged(), cancelled));
-    let EstimatedError { whole: estimate, groups, vertices, .. } = found;
+    let is_reached = target.is_some_and(|target| target.is_reached(estimated.errors(), cancelled));
+    let EstimatedError { whole: estimate, groups, vertices, .. } = estimated;
     light.surface.error = vertices;
     clock.timings.estimate = clock.lap();
     // The bake ends here, whatever the callback says.

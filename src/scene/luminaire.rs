@@ -179,7 +179,8 @@ impl Scene {
         !self.sky.is_black() || !self.luminaires.is_empty()
     }
 
-    /// Whether there is light from known directions, which casts sharp shadows: the sun, luminaires.
+    /// Whether there is light from known directions, which casts sharp shadows: the sun,
+    /// luminaires.
     pub(crate) fn has_directional_light(&self) -> bool {
         self.sky.sun().is_some() || !self.luminaires.is_empty()
     }
