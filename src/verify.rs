@@ -42,7 +42,7 @@ pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 const FIRST_PATHS: usize = 64;
 
 /// Measures how far `solution` is off on `scene`. `progress` hears several times a second how far
-/// it has come; with a break, what the rounds before found is given.
+/// it has come; with a break, the result is that of the rounds before.
 ///
 /// The same scene, solution and settings give the same numbers, whatever the number of threads;
 /// where time runs out, how many rounds there are depends on the machine.
@@ -76,13 +76,13 @@ pub struct Verifier<'a> {
 /// What ends a measurement before it is as precise as asked for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Limits {
-    /// An error that is to be met: it is enough to know whether it is.
+    /// Target: the measurement may end when it is known whether the error is below.
     pub error: Option<f64>,
     /// Whether every group is to meet it.
     pub each_group: bool,
     /// Paths over all points, for all measurements together.
     pub paths: Option<u64>,
-    /// The same where what was found, or its standard error, is above the error that is to be met.
+    /// The same where the measured error, or its standard error, is above the target.
     pub paths_in_doubt: Option<u64>,
 }
 
@@ -188,7 +188,7 @@ impl<'a> Verifier<'a> {
                 }
                 continue;
             };
-            // The whole is as well known as it has to be: groups may not be.
+            // The whole is known well enough; groups may not be.
             let is_open = |group: &Estimate| limits.leaves_open(group, settings.precision);
             let more = (sampler.double(is_open) * self.paths) as u64;
             if more == 0 || limits.paths.is_some_and(|most| traced + more > most) {
@@ -207,7 +207,8 @@ impl Limits {
         self.error.is_some_and(is_far) && off <= 0.25 * error.value
     }
 
-    /// Whether it is open whether a `group` meets the error, and more points would tell.
+    /// Whether a `group` is within one standard error of the target, and not yet known to
+    /// `precision`.
     fn leaves_open(&self, group: &Estimate, precision: f64) -> bool {
         let off = group.standard_error;
         let is_near = |limit: f64| (group.value - limit).abs() <= off;
@@ -222,9 +223,9 @@ impl Limits {
         let Some(most) = (if is_in_doubt { self.paths_in_doubt } else { self.paths }) else {
             return false;
         };
-        let found = error.value - 2.0 * error.standard_error;
+        let lower_bound = error.value - 2.0 * error.standard_error;
         let off = error.standard_error / (most / traced).max(1) as f64;
-        let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(found));
+        let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(lower_bound));
         2 * traced > most || in_vain
     }
 }

@@ -11,7 +11,7 @@ pub(super) struct ErrorTarget<'a> {
     pub error: f64,
     /// Whether every group of the scene is to meet it, and not only the whole.
     pub each_group: bool,
-    /// Sets by hand what was chosen, after every choice.
+    /// Changes the settings after every choice of the bake.
     pub overrides: &'a dyn Fn(&mut BakeSettings),
 }
 
@@ -20,13 +20,13 @@ pub(super) struct ErrorTarget<'a> {
 pub(super) struct TargetErrors<'e> {
     /// The measure that is asked for.
     pub whole: &'e ErrorEstimate,
-    /// The same by light in the place of area: what is bright is to meet the target too.
+    /// The same weighted by light instead of area: bright surfaces are to meet the target too.
     pub by_light: &'e ErrorEstimate,
     pub groups: &'e [GroupError],
 }
 
 impl ErrorTarget<'_> {
-    /// Whether the estimate is below the target, safely: further rounds are not worth it.
+    /// Whether the estimate is below the target by the margin of safety, so that the bake can end.
     pub fn is_met(&self, errors: TargetErrors) -> bool {
         let limit = model::SAFETY * self.error;
         // A measurement by paths includes what the estimate may miss.
@@ -34,8 +34,8 @@ impl ErrorTarget<'_> {
         errors.by_light.total <= limit && self.is_below(whole * self.error, errors)
     }
 
-    /// Whether the estimate is at most the target; of a bake that was `stopped`, where fewer points
-    /// say so, whether it is safely below.
+    /// Whether the estimate is at most the target; of a bake that was `stopped`, which has fewer
+    /// points, whether it is below by the margin of safety.
     pub fn is_reached(&self, errors: TargetErrors, stopped: bool) -> bool {
         if stopped { self.is_met(errors) } else { self.is_below(self.error, errors) }
     }
@@ -215,23 +215,20 @@ impl Steps {
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
         let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
         let bounces = truncation.hypot(unshot);
-        // Where sampling is lowered too, and where it stays.
-        let caps = |bounces: f64| {
-            let all = model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed);
-            (all, model::water_filling_cap([mesh, bounces], sampling, allowed))
+        let cap = |bounces: f64, lowers_sampling: bool| match lowers_sampling {
+            true => model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed),
+            false => model::water_filling_cap([mesh, bounces], sampling, allowed),
         };
-        let (cap_of_all, cap_of_rest) = caps(bounces);
-        // More rays have every vertex gather again; what is left of the error may cost less.
         let growth = |cap: f64| model::vertex_growth(mesh, cap);
-        let all = growth(cap_of_all) * model::ray_factor(sampling, cap_of_all);
-        let rest = growth(cap_of_rest) - 1.0;
-        let leaves_enough = model::leaves_budget(sampling, allowed);
-        let lowers_sampling = sampling > cap_of_all && (all < rest || !leaves_enough);
-        let chosen = |(all, rest): (f64, f64)| if lowers_sampling { all } else { rest };
-        let cap = chosen((cap_of_all, cap_of_rest));
-        // Bounces take few rays: where they leave more of the error to the elements, these have
-        // less to be split.
-        let saved = growth(cap) - growth(chosen(caps(0.0)));
+        // With more rays every vertex gathers again; finer elements alone may cost less.
+        let cap_with_rays = cap(bounces, true);
+        let cost_with_rays = growth(cap_with_rays) * model::ray_factor(sampling, cap_with_rays);
+        let cost_of_mesh = growth(cap(bounces, false)) - 1.0;
+        let lowers_sampling = sampling > cap_with_rays
+            && (cost_with_rays < cost_of_mesh || !model::leaves_budget(sampling, allowed));
+        // All further bounces take few rays, and leave more of the error to the elements.
+        let saved = growth(cap(bounces, lowers_sampling)) - growth(cap(0.0, lowers_sampling));
+        let cap = cap(bounces, lowers_sampling);
         Steps {
             sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),

@@ -41,7 +41,7 @@ pub(super) const AVERAGED_VARIANCE: f64 = 0.5;
 pub struct ErrorEstimate {
     /// All parts together.
     pub total: f64,
-    /// Standard error of the total, since it is found at random points.
+    /// Standard error of the total, by the scatter of the random points.
     pub uncertainty: f64,
     /// Root mean square over the tail, which the total leaves out.
     pub tail: f64,
@@ -88,7 +88,7 @@ pub struct GroupError {
     pub tail_share: f64,
 }
 
-/// What was found at a random point of the surface.
+/// Gathers at a random point of the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Observation {
     /// Index of the stratum that the point stands for.
@@ -108,7 +108,7 @@ pub(super) struct Observation {
     /// Whether the point is hidden by what touches its surface or encloses it, so that nobody sees
     /// it, or sees next to nothing itself.
     pub excluded: bool,
-    /// Share of the hemisphere in which nothing is seen.
+    /// Share of the hemisphere without surfaces.
     pub escaped: f64,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct Stratum {
     pub ambient: f64,
 }
 
-/// What is known of the scene and of the solve.
+/// Properties of the scene and of the solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conditions<'a> {
     pub strata: &'a [Stratum],
@@ -240,7 +240,7 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     let further = FurtherBounces::new(&Means(&all), conditions);
     let parts = |strata: &mut [StratumDeviations], standard_errors: f64| {
         let tail = split_off_tail(strata, &further, conditions.tail);
-        parts(strata, further, passed, (standard_errors, tail), conditions)
+        parts(strata, further, passed, standard_errors, tail, conditions)
     };
     let lit_floor = lit_floor(&Means(&all), conditions);
     let mut lit: Vec<StratumDeviations> = all.iter().map(|s| s.by_light(lit_floor)).collect();
@@ -311,13 +311,15 @@ fn lit_floor(means: &Means, conditions: &Conditions) -> f64 {
     (conditions.floor * mean).max(f64::MIN_POSITIVE)
 }
 
-/// All parts over `strata`, with so many standard errors added to what scatters most, and cut off
-/// from the tail at this square; `passed` is the share of the unshot light that bounces keep.
+/// All parts over `strata`, with `standard_errors` added to the squares of the interpolation; the
+/// tail is cut off at the square `cut`, and `passed` is the share of the unshot light that bounces
+/// keep.
 fn parts(
     strata: &[StratumDeviations],
     further: FurtherBounces,
     passed: f64,
-    (standard_errors, cut): (f64, f64),
+    standard_errors: f64,
+    cut: f64,
     conditions: &Conditions,
 ) -> ErrorEstimate {
     let means = Means(strata);

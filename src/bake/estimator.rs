@@ -1,13 +1,13 @@
 //! Random points that observe how far off a result is.
 //!
-//! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
-//! the reflecting area of each: a quarter of them evenly, a quarter evenly over octaves of distance
-//! (where all is near, that is the same), half where elements are expected to be off most of what
-//! is darkest in them, since few places make up most of a root mean square: by their residuals, or
-//! by a jump of the light between their corners. Each gathers twice what lit the result, the second
-//! time from a hair beside, where rays and hemicubes are rotated otherwise; and once the result
-//! itself. The [statistics](super::error_estimate) of that are the estimate; the share of each
-//! vertex follows the residuals of the elements around it.
+//! Points are spread over the groups of the scene, and over the reflecting area of each: a quarter
+//! of them uniformly, a quarter uniformly over octaves of distance, and half in proportion to the
+//! expected error of elements relative to their darkest corner, since a small area has most of the
+//! squared error: by their residuals, or by a jump of the light between their corners. Each point
+//! gathers the sources of the result twice, the second time 0.1 % of the element's size beside,
+//! where rays and hemicubes have another rotation; and once the result itself. The
+//! [statistics](super::error_estimate) of these are the estimate; the share of each vertex follows
+//! the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 
@@ -69,8 +69,8 @@ pub(super) struct ErrorEstimator<'a> {
     pub diagonal: f64,
     /// Over which points are spread.
     pub octaves: &'a Octaves,
-    /// Reflected radiosity below which errors are relative to this instead, W/m², as far as is
-    /// known before the points are looked at; they say it better.
+    /// Reflected radiosity below which errors are relative to this instead, W/m²; replaced by that
+    /// of the points.
     pub expected_floor: f64,
     /// Follows paths through the scene; not needed for the elements' own light.
     pub paths: Option<&'a PathTracer<'a>>,
@@ -386,7 +386,7 @@ impl ErrorEstimator<'_> {
             let group = stratum.group.map(|g| g as usize);
             stratum.ambient = group.map_or(whole, |g| mean(squares[g], areas[g]));
         }
-        // Every bounce returns the largest albedo of what is left, at most.
+        // Every bounce keeps at most the largest albedo.
         let bound = self.ledger.unshot * max_albedo / (Rgb::ONE - max_albedo) / flux;
         if flux == Rgb::ZERO { 0.0 } else { bound.max_element() }
     }
@@ -491,7 +491,7 @@ impl Sample {
         }
     }
 
-    /// A point a hair beside.
+    /// The point of the second gather.
     fn jittered(&self) -> TwoSidedPoint {
         self.point.beside(self.inward, self.size, self.rotation)
     }

@@ -1,4 +1,4 @@
-//! The second phase of a bake: vertices gather, their error is estimated, and what is most of it is
+//! The second phase of a bake: vertices gather, their error is estimated, and its largest parts are
 //! refined.
 //!
 //! ```text
@@ -69,17 +69,18 @@ enum Next {
 }
 
 impl<'a> GatherPhase<'a> {
-    /// Vertices of `mesh` that are to gather `light`, as `settings` say. Given a `target`, a pilot
-    /// chooses how many rays a vertex casts.
+    /// For vertices of `mesh` that gather `light` by the settings `gather`. Given a `target`, a
+    /// pilot chooses the rays per vertex.
     pub fn new(
-        settings: (SolveSettings, GatherSettings, Measure),
+        settings: &BakeSettings,
+        gather: &GatherSettings,
         target: Option<ErrorTarget<'a>>,
         mesh: Mesh,
         light: &'a GatheredMesh,
         shot: &'a ShotLight,
         backend: &'a ResilientBackend<'a>,
     ) -> Result<GatherPhase<'a>, Error> {
-        let (solve, gather, measure) = settings;
+        let (solve, gather, measure) = (settings.solve.clone(), gather.clone(), settings.measure);
         let state = AdaptiveGather::new(mesh, light, gather.refinement.region, measure);
         let gatherer = backend.gather(
             &shot.mesh,
@@ -190,7 +191,7 @@ impl<'a> GatherPhase<'a> {
         Ok(RayGather::new(&self.shot.mesh, rays)?.with_near_field())
     }
 
-    /// Takes `step`, and says why it ended.
+    /// Takes `step`; why it ended.
     fn gather(&mut self, step: Step, reporter: &mut Reporter) -> Result<StopReason, Error> {
         let refinement = self.gather.refinement.clone();
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
@@ -310,8 +311,8 @@ impl<'a> GatherPhase<'a> {
         Estimated { light, error, cancelled }
     }
 
-    /// Chooses how many rays a vertex casts, by how much two gathers of `light` disagree at a few
-    /// points; they tell how dim is too dim to matter, too.
+    /// Chooses the rays per vertex by the difference of two gathers of `light` at 256 points, and
+    /// the floor of the radiosity by their mean.
     fn choose_rays(&mut self, light: &GatheredMesh, target: ErrorTarget) -> Result<(), Error> {
         let pilot = ErrorEstimator {
             light,
@@ -325,8 +326,8 @@ impl<'a> GatherPhase<'a> {
             expected_floor: self.state.radiosity_floor(),
             paths: None,
         };
-        // Rays are doubled where they disagree, as for vertices: a few dim places do not ask for
-        // more of them everywhere.
+        // Rays are doubled where they disagree, as for vertices: a few dim points do not need more
+        // of them everywhere.
         let noise = controller::noise_tolerance(target.error);
         let dim = self.state.radiosity_floor();
         let mut gatherer = self.backend.gather(&self.shot.mesh, self.gather.rays, noise, dim)?;
@@ -342,8 +343,8 @@ impl<'a> GatherPhase<'a> {
         Ok(())
     }
 
-    /// Refines the settings where the estimate is too large for the target, and says what is to be
-    /// done again; nothing if nothing can be refined, or overrides keep all settings as they are.
+    /// Refines the settings where the estimate is above the target; the step that follows, none if
+    /// nothing can be refined or overrides keep all settings.
     fn refine_settings(
         &mut self,
         target: ErrorTarget,
@@ -353,7 +354,7 @@ impl<'a> GatherPhase<'a> {
         self.step_to(refined, target)
     }
 
-    /// Takes the settings `refined`, as far as the overrides let it, and says what is to be done.
+    /// Takes the settings `refined` after the overrides; the step that follows, if any changed.
     fn step_to(
         &mut self,
         refined: GatherSettings,

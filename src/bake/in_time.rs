@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! error 0.2 ─► 0.06 ─► 0.025 ─► stopped │ time
-//!              └──────────┴── the time that these took tells what the next may be
+//!              └──────────┴── their times give the next error
 //! ```
 //!
 //! Each starts from nothing. The one of least estimated error is kept: what was stopped may be
@@ -76,7 +76,7 @@ pub(super) fn bake_in_time(
         });
         let short = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
         let outcome = match goal {
-            // A time was asked for, and the errors that were tried are nobody's.
+            // Only a time was asked for.
             None => Outcome::Unasked,
             Some(_) if is_reached => Outcome::Reached,
             Some(_) if !stopped && error <= least => baked.outcome,

@@ -1,4 +1,4 @@
-//! A quick look at where the light of a scene falls, before any is shot.
+//! Survey of the direct light of a scene, before any is shot.
 //!
 //! 512 points on the surfaces that reflect gather by 32 rays each. Two things follow:
 //!
@@ -8,7 +8,7 @@
 //! - *The lights that are to be gathered.* Of the light of a room's lamp, most falls on the room:
 //!   the lamp shoots it. Of a black box of a kilometre that stands for the sky, next to nothing
 //!   falls on the house in its middle, and no hemicube of its patches resolves the house. Where
-//!   less than half of a light falls on anything that reflects, each element looks for it instead.
+//!   less than half of a light falls on anything that reflects, each element gathers it instead.
 //!
 //! Sky and luminaires light what sees them, and are always gathered.
 //!

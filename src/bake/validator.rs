@@ -35,13 +35,13 @@ const SIGMAS: f64 = 2.0;
 /// The same of a group: of many, some are off by more than two by chance.
 const SIGMAS_PER_GROUP: f64 = 3.0;
 
-/// Paths that a result is measured by, at least.
+/// Minimum of the limits of paths per measurement.
 pub(super) const MIN_PATHS: u64 = 1 << 18;
 
-/// Paths that a result is measured by, at most, for `gathers` at vertices by `rays` each: one per
-/// 32 rays; and the same where it is in doubt whether the error is met, at least 2^21, of a second
-/// or two. In a gap of 1 cm above a lamp the estimate of a small box was 7 % and its error 17.5 ±
-/// 2.1 %, which 128 paths at each of 1024 points leave open, and 1024 do not.
+/// Limits of paths per measurement, for `gathers` at vertices by `rays` each: one path per 32 rays;
+/// and the same where it is in doubt whether the error is met, at least 2^21, of a second or two.
+/// In a gap of 1 cm above a lamp the estimate of a small box was 7 % and its error 17.5 ± 2.1 %,
+/// which 128 paths at each of 1024 points leave open, and 1024 do not.
 pub(super) fn paths(gathers: u64, rays: u32) -> [u64; 2] {
     let paths = (gathers * u64::from(rays) / 32).max(MIN_PATHS);
     [paths, paths.max(1 << 21)]

@@ -461,18 +461,14 @@ impl<'a> AdaptiveGather<'a> {
             let mut queue = &pending[..];
             while !queue.is_empty() {
                 let batch = batch_sizer.next(&mut queue, |vertices| {
-                    let places = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
-                    gather_batch(vertices, places, &source, gatherer)
+                    let points = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
+                    gather_batch(vertices, points, &source, gatherer)
                 })?;
                 let unresolved = batch.unresolved(&points, attempt);
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
-                batch.apply(
-                    &points,
-                    (attempt, self.scale.diagonal),
-                    light,
-                    &mut VertexValues { reflected, noise, buried, hidden, direct },
-                );
+                let mut values = VertexValues { reflected, noise, buried, hidden, direct };
+                batch.apply(&points, attempt, self.scale.diagonal, light, &mut values);
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {
                     pass: self.pass,
@@ -497,7 +493,8 @@ impl<'a> AdaptiveGather<'a> {
     }
 }
 
-/// `settings` for the light that others gather, so many passes later.
+/// `settings` of a pass with `passes` after it: thrice the error of the mesh and the shortest edge
+/// for each.
 fn coarser(settings: &RefinementSettings, passes: u32) -> RefinementSettings {
     let coarsening = 3f64.powi(passes as i32);
     RefinementSettings {

@@ -1,8 +1,8 @@
 //! Irradiance at points anywhere: on surfaces or in the air, each with its standard error.
 //!
-//! A point gathers four times, from heights a hair apart. Each is another cell of the rotation, so
-//! that rays look elsewhere, while the light is the same. The mean is the irradiance,
-//! and how far the four are apart its standard error:
+//! A point gathers four times, from slightly different heights. Each is another cell of the
+//! rotation, so that directions differ while the light is the same. The mean is the irradiance, and
+//! the scatter of the four gives its standard error:
 //!
 //! ```text
 //!    ●  E_3        E = (E_0 + E_1 + E_2 + E_3) / 4

@@ -3,19 +3,19 @@
 //! An element that is not split is predicted to be off by e, root mean square over its area and
 //! relative to the radiosity of its darkest corner, or to the floor where that is more: what is
 //! between a bright corner and a dark one may be as dark as the latter. Its share of the squared
-//! error of the whole is e² times its area, and least elements are needed where all those not split
-//! have about the same share (Dörfler 1996 marks by that sum).
+//! error of the whole is e² times its area, and the number of elements is minimal if all that are
+//! not split have about the same share (Dörfler 1996 marks by that sum).
 //!
-//! | what is known of the element | e |
+//! | element | e |
 //! |---|---|
 //! | a parent of smooth light, of surplus s | s/8: a child's own is s/4, and e is half of that |
 //! | a parent with a jump | 0.2 of the largest difference of corners |
 //! | no parent | 1/8 of that, or how far the light before is from linear |
 //!
 //! Differences count as far as they are more than the noise of what they are between.
-//! Elements far from the region of the light count as if they were as much smaller as elements grow
-//! there. Nothing is known of the middle of an element whose corners are all buried, under houses
-//! that stand on a ground, say: if there was light before, it is split.
+//! Elements far from the region of the light count as if they were smaller, by the factor that
+//! elements grow by there. Elements with buried corners only, such as those under houses that stand
+//! on a ground, are split if there was light before.
 
 use arrayvec::ArrayVec;
 use glam::DVec2;
@@ -49,10 +49,10 @@ pub(crate) const RMS_OVER_JUMP: f64 = 0.2;
 /// maximum of a monotone function.
 const END_DIFFERENCE_SHARE: f64 = 0.25;
 
-/// Squared error of an element that has to be split because nothing is known of its middle.
+/// Squared error of an element that has to be split because its vertices do not predict it.
 pub(super) const UNKNOWN: f64 = f64::INFINITY;
 
-/// What errors are relative to, found once at the start of a gather.
+/// Scales of errors and lengths in a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
@@ -61,7 +61,7 @@ pub(crate) struct ErrorScale {
     pub diagonal: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
-    /// Where most of the light is: elements grow with the distance from it.
+    /// The region of the light: elements grow with the distance from it.
     region: Option<Aabb>,
 }
 
@@ -83,7 +83,7 @@ impl ErrorScale {
         }
     }
 
-    /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
+    /// Distance up to which surfaces touch, scene unit.
     pub fn touching(&self) -> f64 {
         hidden::NEAR * self.diagonal
     }

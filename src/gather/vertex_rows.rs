@@ -59,8 +59,8 @@ impl<'a> VertexRows<'a> {
         self.points.point(v, 0).shares()
     }
 
-    /// What `work` makes of the row of each of `vertices`, in their order, made by so many `parts`
-    /// of the rays; none where `progress` broke, which is told of each batch that is done.
+    /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
+    /// rays; none if `progress`, called after each batch with the number done, breaks.
     pub fn map<T: Send>(
         &self,
         vertices: &[u32],

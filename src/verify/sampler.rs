@@ -37,7 +37,7 @@ struct Stratum {
     points: Vec<TracedPoint>,
     /// Sum of the weights of the points.
     weight: f64,
-    /// Points that it has at least.
+    /// Minimum number of points.
     least: usize,
 }
 
@@ -83,7 +83,7 @@ impl<'a> Sampler<'a> {
         let counting = |s: &Stratum| s.surface.share * (1.0 - s.hidden_share());
         let whole: f64 = self.strata.iter().map(counting).sum();
         for stratum in &mut self.strata {
-            // Where all is hidden, as far as is known, all is looked at.
+            // Where all points are hidden so far, all area has points.
             let share = match whole > 0.0 {
                 true => counting(stratum) / whole,
                 false => stratum.surface.share,
@@ -270,7 +270,7 @@ impl<'a> Sampler<'a> {
         TrimmedSquare::new(&counting.concat(), self.settings.measure.tail).unwrap_or_default()
     }
 
-    /// What is known so far, and the mean square error that is its error.
+    /// The result so far, and the mean square error of the whole.
     pub fn verification(&self) -> (Verification, MeanSquare) {
         let hidden = self.settings.hidden;
         let mean_reflected = self.mean_reflected(hidden);
