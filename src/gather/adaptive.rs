@@ -234,7 +234,10 @@ impl<'a> AdaptiveGather<'a> {
             self.promote_to_source();
         }
         if let Some(rows) = bounces {
-            let gatherer = coarse.as_deref_mut().unwrap_or(&mut *last);
+            let gatherer: &mut dyn Gather = match coarse {
+                Some(coarse) => coarse,
+                None => &mut *last,
+            };
             if self.gather_pass(settings, gatherer, probes.as_deref_mut(), progress)?
                 == StopReason::Cancelled
                 || self.add_further_bounces(rows, progress) == StopReason::Cancelled
