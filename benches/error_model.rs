@@ -1,5 +1,5 @@
-//! Measures the model of error and cost that bakes are steered by (`radiosity::bake::model`), and
-//! prints each law beside the model's number.
+//! Measures the model of error and cost that controls bakes (`src/bake/model.rs`), and prints each
+//! law beside the model's number.
 //!
 //!     RADIOSITY_BENCH=full cargo bench --bench error_model [-- SCENE.obj …]
 //!
@@ -29,7 +29,6 @@ use glam::DVec3;
 use radiosity::accuracy::Measure;
 use radiosity::backend::cpu::RayGather;
 use radiosity::bake::GatherSettings;
-use radiosity::bake::model::{self, PowerLaw};
 use radiosity::gather::GatherPoint;
 use radiosity::{
     Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, Gather, GatheredMesh, Rgb,
@@ -114,7 +113,7 @@ impl Bench {
                 gather.noise_tolerance = f64::INFINITY;
             },
         )?;
-        row("sampling ~ rays", &sampling, Some(-model::RQMC_EXPONENT));
+        row("sampling ~ rays", &sampling, Some(-0.75));
         let unshot = |settings: &mut BakeSettings, factor| settings.solve.solver.unshot *= factor;
         let unshot = self.part(unshot, &[64.0, 16.0, 4.0, 1.0], |e| e.unshot, |_, _| {})?;
         row("unshot ~ unshot share", &unshot, Some(1.0));
@@ -169,12 +168,15 @@ impl Bench {
             surplus.push((error, gather.refinement.mesh_error));
             edge.push((error, gather.refinement.min_edge / diagonal));
         }
-        row("seconds ~ error", &seconds, Some(-model::COST_EXPONENT));
-        law("rays", &rays, model::RAYS_TIMES_ERROR, -1.0);
-        let PowerLaw { scale, exponent, .. } = model::MESH_ERROR;
-        law("error of the mesh", &surplus, scale, exponent);
-        let PowerLaw { scale, exponent, .. } = model::MIN_EDGE;
-        law("shortest edge", &edge, scale, exponent);
+        row("seconds ~ error", &seconds, Some(-1.6 - 1.0 / 0.75));
+        let initial = |of: &dyn Fn(&GatherSettings) -> f64| -> Vec<(f64, f64)> {
+            let settings =
+                TARGETS.map(|error| (error, BakeSettings::for_error(error, &self.scene)));
+            settings.iter().filter_map(|(e, s)| Some((*e, of(s.gather.as_ref()?)))).collect()
+        };
+        law("rays", &rays, &initial(&|gather| f64::from(gather.rays)));
+        law("error of the mesh", &surplus, &initial(&|gather| gather.refinement.mesh_error));
+        law("shortest edge", &edge, &initial(&|gather| gather.refinement.min_edge / diagonal));
         Ok(())
     }
 
@@ -191,7 +193,7 @@ impl Bench {
             let baked = self.bake(&settings)?;
             errors.push((factor, compare(&baked, &reference)?.error));
         }
-        row("error ~ shooting edge", &errors, Some(1.0 / model::SHOOTING_EDGE.exponent));
+        row("error ~ shooting edge", &errors, Some(2.5));
         for error in [0.1, BASE] {
             let baked =
                 BakeTarget::Error(error).bake(self.scene.clone(), &Backend::Cpu, keep_going)?;
@@ -201,7 +203,7 @@ impl Bench {
                  points within 2 standard errors",
                 "tail factor",
                 format!("{:.2}", compared.tail_factor),
-                format!("{:.2}", model::TAIL_FACTOR),
+                "1.00",
                 baked.estimate.total,
                 compared.error,
                 100.0 * compared.within
@@ -227,7 +229,7 @@ struct Comparison {
     error: f64,
     /// Share of the points that are off by up to twice their standard error.
     within: f64,
-    /// What the model's tail factor would have to be for 95 % of them.
+    /// Factor of the standard errors for 95 % of the points to be within twice these.
     tail_factor: f64,
 }
 
@@ -262,11 +264,7 @@ fn compare(baked: &BakeResult, reference: &BakeResult) -> Result<Comparison, Err
     ratios.sort_by(f64::total_cmp);
     let quantile = ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(0.0);
     let within = ratios.partition_point(|&ratio| ratio <= 2.0) as f64 / ratios.len().max(1) as f64;
-    Ok(Comparison {
-        error: square.sqrt(),
-        within,
-        tail_factor: model::TAIL_FACTOR * quantile / 2.0,
-    })
+    Ok(Comparison { error: square.sqrt(), within, tail_factor: quantile / 2.0 })
 }
 
 /// Both at the centroids of faces, one for every so much area; none where other surfaces cover
@@ -311,9 +309,10 @@ fn area_normal(surface: &VertexMesh, face: &[u32; 3]) -> DVec3 {
     (b - a).cross(c - a) / 2.0
 }
 
-/// A line of the table for value = scale · setting^exponent, given both.
-fn law(name: &str, points: &[(f64, f64)], scale: f64, exponent: f64) {
-    let (fitted_scale, fitted_exponent) = fit(points);
+/// A line of the table for value = scale · error^exponent, fitted to `points` and to the `initial`
+/// settings.
+fn law(name: &str, points: &[(f64, f64)], initial: &[(f64, f64)]) {
+    let [(fitted_scale, fitted_exponent), (scale, exponent)] = [fit(points), fit(initial)];
     println!(
         "{name:25} {:>10} {:>10}   {}",
         format!("{fitted_scale:.2} e^{fitted_exponent:.2}"),

@@ -34,9 +34,8 @@ mod estimator;
 mod fallback;
 mod gather_phase;
 mod in_time;
-mod judge;
 mod light_survey;
-pub mod model;
+pub(crate) mod model;
 mod outcome;
 mod pipeline;
 mod progress;
@@ -47,6 +46,7 @@ mod shooting_phase;
 mod strata;
 mod target;
 mod to_error;
+mod validator;
 
 pub use error_estimate::{ErrorEstimate, GroupError};
 pub use outcome::{Obstacle, Outcome};

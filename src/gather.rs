@@ -14,6 +14,7 @@
 pub(crate) mod adaptive;
 mod batch;
 mod buried;
+mod centroid_probes;
 mod directional_light;
 pub(crate) mod exchange;
 mod further_bounces;
@@ -28,7 +29,6 @@ mod progress;
 pub(crate) mod refinement_indicator;
 mod refinement_settings;
 mod sampled_mesh;
-pub(crate) mod scouts;
 mod shadow_edges;
 mod source_light;
 mod surplus;

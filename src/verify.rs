@@ -2,8 +2,8 @@
 //! nothing with the solver but the casting of rays.
 //!
 //! ```text
-//! scene ──► random points of ──► told: the solution's face there ─────────────┐
-//!           each group      └──► true: paths in four independent parts ──► mean square error
+//! scene ──► random points of ──► B: the solution's face there ─────────────┐
+//!           each group      └──► T: paths in four independent parts ──► mean square error
 //!                                 ▲                                        of groups, of all
 //!                                 └── more paths, or more points, by which adds more variance
 //! ```
@@ -11,9 +11,9 @@
 //! The measure is that of [`accuracy`](crate::accuracy), over the points that are not hidden unless
 //! these are asked for ([`Settings::hidden`]).
 //!
-//! Noise of the paths is no error: (B_told − T₁)·(B_told − T₂), of two independent means T₁ and T₂,
-//! has the mean |B_told − B_true|², however noisy they are. Which points are in the tail is decided
-//! by other paths than those that measure them.
+//! Noise of the paths adds no error: with two independent means T₁ and T₂, (B − T₁)·(B − T₂) has
+//! the expectation |B − B_true|². Which points are in the tail is decided by other paths than those
+//! that measure them.
 
 mod sampler;
 mod settings;
@@ -38,26 +38,11 @@ use solution::SolutionLookup;
 pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 
-/// Points of the first round, at least.
-const FIRST_POINTS: usize = 512;
-
-/// Paths a point in the first round, at least for anything to be known.
+/// Paths per point in the first round, and the minimum for a result.
 const FIRST_PATHS: usize = 64;
 
-/// There is a point for so many vertices, at least: the more there are, the rarer are the places
-/// that a mesh so fine still misses, and points that meet none of them seem sure of too small an
-/// error. Chosen by hand: of 26 901 points of a room of half a million vertices, two had 30 % of
-/// the squared error, which a thousand points mostly miss.
-const VERTICES_PER_POINT: usize = 64;
-
-/// A standard error below this share of the error leaves it known roughly.
-const ROUGHLY: f64 = 0.25;
-
-/// An error surely below this share is negligible, however well it is known.
-const NEGLIGIBLE: f64 = 1e-4;
-
 /// Measures how far `solution` is off on `scene`. `progress` hears several times a second how far
-/// it has come; with a break, what the rounds before found is given.
+/// it has come; with a break, the result is that of the rounds before.
 ///
 /// The same scene, solution and settings give the same numbers, whatever the number of threads;
 /// where time runs out, how many rounds there are depends on the machine.
@@ -91,13 +76,13 @@ pub struct Verifier<'a> {
 /// What ends a measurement before it is as precise as asked for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Limits {
-    /// An error that is to be met: it is enough to know whether it is.
+    /// Target: the measurement may end when it is known whether the error is below.
     pub error: Option<f64>,
     /// Whether every group is to meet it.
     pub each_group: bool,
     /// Paths over all points, for all measurements together.
     pub paths: Option<u64>,
-    /// The same where what was found, or its standard error, is above the error that is to be met.
+    /// The same where the measured error, or its standard error, is above the target.
     pub paths_in_doubt: Option<u64>,
 }
 
@@ -115,15 +100,15 @@ impl<'a> Verifier<'a> {
             let remedy = "measure in the scene that `Scene::resolve_sides` gives";
             return Err(Error::new(ErrorKind::Scene, "sides", "not resolved", remedy));
         }
-        Verifier::starting_with(scene, settings.clone(), (FIRST_POINTS, FIRST_PATHS))
+        Verifier::starting_with(scene, settings.clone(), 512, FIRST_PATHS)
     }
 
-    /// With so many `points` in the first round, or more if there are many vertices, and so many
-    /// `paths` at each.
+    /// With `points` in the first round, or more if there are many vertices, and `paths` at each.
     pub(crate) fn starting_with(
         scene: &'a Scene,
         settings: Settings,
-        (points, paths): (usize, usize),
+        points: usize,
+        paths: usize,
     ) -> Result<Verifier<'a>, Error> {
         let sampler = Sampler::new(scene, &settings)?;
         Ok(Verifier { sampler, settings, points, paths })
@@ -150,7 +135,7 @@ impl<'a> Verifier<'a> {
     pub fn measure_at_same_points(&mut self, solution: &VertexMesh) -> Result<Verification, Error> {
         let solution = SolutionLookup::new(solution, self.sampler.scene())?;
         self.sampler.forget();
-        self.sampler.tell(&solution)?;
+        self.sampler.look_up(&solution)?;
         Ok(Verification { stop: Stop::Rounds, ..self.sampler.verification().0 })
     }
 
@@ -163,12 +148,14 @@ impl<'a> Verifier<'a> {
     ) -> Result<Verification, Error> {
         let (sampler, settings) = (&mut self.sampler, &self.settings);
         let start = Instant::now();
-        self.points = self.points.max(solution.places() / VERTICES_PER_POINT);
+        // A point per 64 vertices: the finer a mesh, the rarer what it misses. Of 26 901 points of
+        // a room of half a million vertices, two had 30 % of the squared error.
+        self.points = self.points.max(solution.vertices() / 64);
         sampler.forget();
         let (mut verification, _) = sampler.verification();
         verification.stop = loop {
             sampler.add_points(self.points);
-            sampler.tell(solution)?;
+            sampler.look_up(solution)?;
             let round = |done, of| progress(&Progress { done, of, error: verification.error });
             if sampler.trace(self.paths, round).is_break() {
                 break Stop::Cancelled;
@@ -178,7 +165,7 @@ impl<'a> Verifier<'a> {
             let error = all.root();
             // What a biased mean square adds to its root.
             let biased = all.bias > settings.precision * all.value;
-            if error.value + 2.0 * error.standard_error <= NEGLIGIBLE {
+            if error.value + 2.0 * error.standard_error <= 1e-4 {
                 break Stop::Negligible;
             }
             let is_precise = error.standard_error <= settings.precision * error.value;
@@ -190,8 +177,8 @@ impl<'a> Verifier<'a> {
                 // Another round doubles all that was done so far.
                 break Stop::Time;
             } else if limits.end_at(traced, &error)
-                || self.points >= MAX_POINTS
-                || self.paths >= MAX_PATHS
+                || self.points >= 1 << 22
+                || self.paths >= 1 << 30
             {
                 Stop::Rounds
             } else {
@@ -201,7 +188,7 @@ impl<'a> Verifier<'a> {
                 }
                 continue;
             };
-            // The whole is as well known as it has to be: groups may not be.
+            // The whole is known well enough; groups may not be.
             let is_open = |group: &Estimate| limits.leaves_open(group, settings.precision);
             let more = (sampler.double(is_open) * self.paths) as u64;
             if more == 0 || limits.paths.is_some_and(|most| traced + more > most) {
@@ -213,41 +200,35 @@ impl<'a> Verifier<'a> {
 }
 
 impl Limits {
-    /// Whether `error` is surely above or below what is to be met, and roughly known.
+    /// Whether `error` is above or below the target by two standard errors, and known to a quarter.
     fn decided_by(&self, error: &Estimate) -> bool {
         let off = error.standard_error;
         let is_far = |limit: f64| (error.value - limit).abs() > 2.0 * off;
-        self.error.is_some_and(is_far) && off <= ROUGHLY * error.value
+        self.error.is_some_and(is_far) && off <= 0.25 * error.value
     }
 
-    /// Whether it is open whether a `group` meets the error, and more points would tell.
+    /// Whether a `group` is within one standard error of the target, and not yet known to
+    /// `precision`.
     fn leaves_open(&self, group: &Estimate, precision: f64) -> bool {
         let off = group.standard_error;
         let is_near = |limit: f64| (group.value - limit).abs() <= off;
         self.each_group && self.error.is_some_and(is_near) && off > precision * group.value
     }
 
-    /// Whether there is no other round after `traced` paths, of twice as many: there may not be, or
-    /// it would be in vain. With all that there may be, an error as large as the one to be met, or
-    /// as what was surely found, would still not be told from none, at best: where noise falls as
-    /// fast as the number of paths grows.
+    /// Whether there is no other round after `traced` paths, of twice as many: the limit is
+    /// reached, or further rounds would be in vain. They are if all paths up to the limit would not
+    /// distinguish the target, or the lower bound of the error, from 0, even with noise ∝ 1/paths.
     fn end_at(&self, traced: u64, error: &Estimate) -> bool {
         let is_in_doubt = self.error.is_some_and(|e| error.value.max(error.standard_error) > e);
         let Some(most) = (if is_in_doubt { self.paths_in_doubt } else { self.paths }) else {
             return false;
         };
-        let found = error.value - 2.0 * error.standard_error;
+        let lower_bound = error.value - 2.0 * error.standard_error;
         let off = error.standard_error / (most / traced).max(1) as f64;
-        let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(found));
+        let in_vain = self.error.is_some_and(|limit| 2.0 * off > limit.max(lower_bound));
         2 * traced > most || in_vain
     }
 }
-
-/// Points there are at most, before those that groups have at least.
-const MAX_POINTS: usize = 1 << 22;
-
-/// Paths a point at most.
-const MAX_PATHS: usize = 1 << 30;
 
 #[cfg(test)]
 mod tests {
@@ -298,13 +279,13 @@ mod tests {
             Scene::new(positions.collect(), triangles.collect(), names, vec![bright]).unwrap();
         // All of the large one is off by 0.2. One face of the small one is, so that all of it is by
         // 0.1: of 64 points 16 ± 3.5 find that, and by these it is 0.1 ± 0.011.
-        let mut told = VertexMesh::default();
+        let mut vertices = VertexMesh::default();
         for t in 0..8 {
-            let first = told.positions.len() as u32;
-            told.positions.extend(scene.corners(t));
-            told.normals.extend([scene.normal(t); 3]);
-            told.radiosity.extend([Rgb::splat(if t < 5 { 2.2 } else { 2.0 }); 3]);
-            told.faces.push([first, first + 1, first + 2]);
+            let first = vertices.positions.len() as u32;
+            vertices.positions.extend(scene.corners(t));
+            vertices.normals.extend([scene.normal(t); 3]);
+            vertices.radiosity.extend([Rgb::splat(if t < 5 { 2.2 } else { 2.0 }); 3]);
+            vertices.faces.push([first, first + 1, first + 2]);
         }
         let points = |limit: f64, each_group: bool, paths: u64| {
             let settings = Settings {
@@ -313,10 +294,10 @@ mod tests {
                 time: None,
                 ..Default::default()
             };
-            let mut verifier = Verifier::starting_with(&scene, settings, (64, 2048)).unwrap();
+            let mut verifier = Verifier::starting_with(&scene, settings, 64, 2048).unwrap();
             let paths = Some(paths);
             let limits = Limits { error: Some(limit), each_group, paths, paths_in_doubt: paths };
-            let solution = SolutionLookup::new(&told, &scene).unwrap();
+            let solution = SolutionLookup::new(&vertices, &scene).unwrap();
             let go = &mut |_: &Progress| ControlFlow::Continue(());
             let found = verifier.measure_within(limits, &solution, go);
             found.unwrap().groups.iter().map(|group| group.points).collect::<Vec<_>>()

@@ -3,41 +3,26 @@
 //!
 //! | condition | threshold | reason |
 //! |---|---|---|
-//! | share of backs | [`BACKS`] | inside a solid |
-//! | share of backs, no light arrives | [`BACKS_IN_THE_DARK`] | no lit point sees it either |
-//! | share of backs, and near | [`NEAR_BACKS`], [`NEAR`] | covered by what stands on it |
-//! | mean of 1/distance | 1/[`CRACK`] | in a crack |
-//! | share of surfaces | [`COVERED`] | in the open: the light of the sky is exact there |
+//! | share of backs | 0.95 | inside a solid: a twentieth for rays through seams |
+//! | share of backs, no light arrives | 0.05 | enclosed: no lit point sees it either |
+//! | share of backs nearer than [`NEAR`] | 0.4 | covered by what stands on it |
+//! | mean of 1/distance | 10⁴ | in a crack |
+//! | share of surfaces | 0.01 | in the open: the light of the sky is exact there |
+//!
+//! At the foot of an inverted wall the share of backs is 0.5; 0.4 is two standard deviations of 128
+//! rays less. Between parallel plates the mean of 1/distance is 2/3 over their distance: in a room
+//! of 5 m, cracks of up to a third of a millimetre count.
 //!
 //! Shares are weighted by the cosine; distances are shares of the diagonal of the region that has
 //! the light. A bake extrapolates into hidden points what they would receive if they were exposed,
 //! so that they have no error that could be measured.
 
-/// Share of backs above which a point is inside a solid. Plain choice: a point in a closed body
-/// sees backs alone, less what seams let through.
-const BACKS: f64 = 0.95;
-
-/// Share of backs above which a point that receives no light is enclosed.
-const BACKS_IN_THE_DARK: f64 = 0.05;
-
 /// Paths without light from which on a point counts as dark: a gap under a roof's boards had a
 /// thousandth of the light outside, which 64 paths miss.
 pub(crate) const PATHS_IN_THE_DARK: usize = 4096;
 
-/// Share of backs above which a point is covered by what is nearer than [`NEAR`]: at the foot of an
-/// inverted wall it is 0.5, of which 0.4 is two standard deviations of 128 rays less.
-pub(crate) const NEAR_BACKS: f64 = 0.4;
-
 /// Distance up to which surfaces touch, share of the diagonal. Plain choice.
 pub(crate) const NEAR: f64 = 0.002;
-
-/// Inverse of the mean of 1/distance below which a point is in a crack, share of the diagonal.
-/// Between parallel plates that mean is 2/3 over their distance: in a room of five metres, cracks
-/// of a third of a millimetre. Next to a wall it is so within less than half of this share.
-pub(crate) const CRACK: f64 = 1e-4;
-
-/// Share of the hemisphere with surfaces below which a point is in the open.
-const COVERED: f64 = 0.01;
 
 /// What a point sees, by any number of rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,11 +42,11 @@ impl Outlook {
     pub fn is_hidden(&self, diagonal: f64) -> bool {
         // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least
         // that share over the distance.
-        let near = NEAR_BACKS / (NEAR * diagonal);
-        self.covered < COVERED
-            || self.backs > if self.dark { BACKS_IN_THE_DARK } else { BACKS }
-            || self.backs > NEAR_BACKS && self.inverse_distance > near
-            || self.inverse_distance * CRACK * diagonal > 1.0
+        let covers = 0.4;
+        self.covered < 0.01
+            || self.backs > if self.dark { 0.05 } else { 0.95 }
+            || self.backs > covers && self.inverse_distance > covers / (NEAR * diagonal)
+            || self.inverse_distance * 1e-4 * diagonal > 1.0
     }
 }
 

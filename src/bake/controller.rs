@@ -1,4 +1,4 @@
-//! What is refined after an estimate, by the [model](crate::bake::model) of error and cost.
+//! What is refined after an estimate, by the [model] of error and cost.
 
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
@@ -11,51 +11,51 @@ pub(super) struct ErrorTarget<'a> {
     pub error: f64,
     /// Whether every group of the scene is to meet it, and not only the whole.
     pub each_group: bool,
-    /// Sets by hand what was chosen, after every choice.
+    /// Changes the settings after every choice of the bake.
     pub overrides: &'a dyn Fn(&mut BakeSettings),
 }
 
-/// The errors that a target judges.
+/// The errors that are compared with a target.
 #[derive(Clone, Copy)]
-pub(super) struct Judged<'e> {
+pub(super) struct TargetErrors<'e> {
     /// The measure that is asked for.
     pub whole: &'e ErrorEstimate,
-    /// The same by light in the place of area: what is bright is to meet the target too.
+    /// The same weighted by light instead of area: bright surfaces are to meet the target too.
     pub by_light: &'e ErrorEstimate,
     pub groups: &'e [GroupError],
 }
 
 impl ErrorTarget<'_> {
-    /// Whether the estimate is below the target, safely: further rounds are not worth it.
-    pub fn is_met(&self, judged: Judged) -> bool {
+    /// Whether the estimate is below the target by the margin of safety, so that the bake can end.
+    pub fn is_met(&self, errors: TargetErrors) -> bool {
         let limit = model::SAFETY * self.error;
-        // What paths found beyond the estimate needs no room for what the estimate does not see.
-        let whole = if judged.whole.sources > 0.0 { model::TARGET_FRACTION } else { model::SAFETY };
-        judged.by_light.total <= limit && self.is_below(whole * self.error, judged)
+        // A measurement by paths includes what the estimate may miss.
+        let whole = if errors.whole.sources > 0.0 { model::TARGET_FRACTION } else { model::SAFETY };
+        errors.by_light.total <= limit && self.is_below(whole * self.error, errors)
     }
 
-    /// Whether the estimate is at most the target; of a bake that was `stopped`, where fewer points
-    /// say so, whether it is safely below.
-    pub fn is_reached(&self, judged: Judged, stopped: bool) -> bool {
-        if stopped { self.is_met(judged) } else { self.is_below(self.error, judged) }
+    /// Whether the estimate is at most the target; of a bake that was `stopped`, which has fewer
+    /// points, whether it is below by the margin of safety.
+    pub fn is_reached(&self, errors: TargetErrors, stopped: bool) -> bool {
+        if stopped { self.is_met(errors) } else { self.is_below(self.error, errors) }
     }
 
-    fn is_below(&self, error: f64, Judged { whole, groups, .. }: Judged) -> bool {
-        whole.total <= error && self.judged(groups).all(|g| cautious(&g.estimate) <= error)
+    fn is_below(&self, error: f64, TargetErrors { whole, groups, .. }: TargetErrors) -> bool {
+        whole.total <= error && self.required(groups).all(|g| cautious(&g.estimate) <= error)
     }
 
     /// The groups that are to meet the error.
-    fn judged<'g>(&self, groups: &'g [GroupError]) -> impl Iterator<Item = &'g GroupError> {
+    fn required<'g>(&self, groups: &'g [GroupError]) -> impl Iterator<Item = &'g GroupError> {
         groups.iter().filter(|_| self.each_group)
     }
 
     /// Whether the uncertainty leaves open whether the target is met.
-    pub fn is_undecided(&self, Judged { whole, groups, .. }: Judged) -> bool {
+    pub fn is_undecided(&self, TargetErrors { whole, groups, .. }: TargetErrors) -> bool {
         let limit = model::SAFETY * self.error;
         let is_open = |least: f64, most: f64| least <= limit && limit < most;
         // The whole has one standard error in it already.
         is_open(whole.total - 2.0 * whole.uncertainty, whole.total)
-            || self.judged(groups).any(|g| is_open(g.estimate.total, cautious(&g.estimate)))
+            || self.required(groups).any(|g| is_open(g.estimate.total, cautious(&g.estimate)))
     }
 
     /// The two halves of `settings` after the overrides.
@@ -104,17 +104,19 @@ impl Step {
 
 /// The noise tolerance of vertices where `target` is asked for.
 pub(super) fn noise_tolerance(target: f64) -> f64 {
-    model::OUTLIER_FACTOR * model::SAMPLING_SHARE * model::allowed_error(target)
+    // Vertices whose rays disagree by three times the error allowed for sampling get more of them.
+    3.0 * model::allowed_sampling(target)
 }
 
 /// `gather` with as many rays as bring `sampling`, the error of those it has, down to its share of
 /// the `target`.
 pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64) -> GatherSettings {
-    let allowed = model::SAMPLING_SHARE * model::allowed_error(target);
+    let allowed = model::allowed_sampling(target);
     let rays = f64::from(gather.rays) * model::ray_factor(sampling, allowed);
     let mut chosen = gather.clone();
     // They come in powers of two; too few would have all vertices gather again.
-    chosen.rays = (model::clamped(rays, model::RAYS).ceil() as u32).next_power_of_two();
+    let rays = rays.clamp(*model::RAYS.start(), *model::RAYS.end());
+    chosen.rays = (rays.ceil() as u32).next_power_of_two();
     chosen.noise_tolerance = noise_tolerance(target);
     chosen
 }
@@ -123,7 +125,7 @@ pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64)
 /// whole and, where every group is to meet it, for those that do not.
 pub(super) fn refined(
     gather: &GatherSettings,
-    Judged { whole, by_light, groups }: Judged,
+    TargetErrors { whole, by_light, groups }: TargetErrors,
     target: &ErrorTarget,
 ) -> GatherSettings {
     let mut refined = gather.clone();
@@ -132,14 +134,14 @@ pub(super) fn refined(
     // Of the whole the one that is further off.
     let worst = if by_light.total > whole.total { by_light } else { whole };
     if worst.total > model::SAFETY * target.error {
-        steps = Steps::to(&with_what_elements_miss(worst, whole.sources), allowed);
+        steps = Steps::to(&with_sources_in_mesh(worst, whole.sources), allowed);
         if let Some(step) = steps.mesh {
             refined.refinement.mesh_error *= step;
             refined.refinement.min_edge *= step;
             refined.refinement.interpolation_tolerance *= step;
         }
     }
-    for group in target.judged(groups) {
+    for group in target.required(groups) {
         if cautious(&group.estimate) <= model::SAFETY * target.error {
             continue;
         }
@@ -147,7 +149,7 @@ pub(super) fn refined(
         let ErrorEstimate { total, sources, .. } = group.estimate;
         let uncertain = (cautious(&group.estimate).powi(2) - total.powi(2)).sqrt();
         let missed = sources.hypot(uncertain);
-        let own = Steps::to(&with_what_elements_miss(&group.estimate, missed), allowed);
+        let own = Steps::to(&with_sources_in_mesh(&group.estimate, missed), allowed);
         steps = steps.both(own);
         if let Some(step) = own.mesh {
             let factors = &mut refined.refinement.group_factors;
@@ -174,7 +176,7 @@ pub(super) fn refined(
 /// nothing else of the estimate can be lowered.
 pub(super) fn with_bounces(
     gather: &GatherSettings,
-    Judged { whole, by_light, groups }: Judged,
+    TargetErrors { whole, by_light, groups }: TargetErrors,
     target: &ErrorTarget,
 ) -> GatherSettings {
     let needs_bounces = |estimate: &ErrorEstimate| {
@@ -183,7 +185,7 @@ pub(super) fn with_bounces(
         let allowed = model::allowed_error(target.error);
         bounces > model::water_filling_cap([bounces], rest, allowed)
     };
-    let groups = target.judged(groups).map(|group| &group.estimate);
+    let groups = target.required(groups).map(|group| &group.estimate);
     let mut refined = gather.clone();
     if [whole, by_light].into_iter().chain(groups).any(needs_bounces) {
         refined.refinement.gather_passes += 1;
@@ -191,9 +193,9 @@ pub(super) fn with_bounces(
     refined
 }
 
-/// `estimate` with what paths find beyond it: bounces are all counted, so that it is what elements
-/// miss.
-fn with_what_elements_miss(estimate: &ErrorEstimate, sources: f64) -> ErrorEstimate {
+/// `estimate` with the `sources` added to the error of the mesh: all bounces are counted, so that
+/// elements are the cause.
+fn with_sources_in_mesh(estimate: &ErrorEstimate, sources: f64) -> ErrorEstimate {
     ErrorEstimate { mesh: estimate.mesh.hypot(sources), ..*estimate }
 }
 
@@ -213,28 +215,25 @@ impl Steps {
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
         let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
         let bounces = truncation.hypot(unshot);
-        // Where sampling is lowered too, and where it stays.
-        let caps = |bounces: f64| {
-            let all = model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed);
-            (all, model::water_filling_cap([mesh, bounces], sampling, allowed))
+        let cap = |bounces: f64, lowers_sampling: bool| match lowers_sampling {
+            true => model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed),
+            false => model::water_filling_cap([mesh, bounces], sampling, allowed),
         };
-        let (cap_of_all, cap_of_rest) = caps(bounces);
-        // More rays have every vertex gather again; what is left of the error may cost less.
         let growth = |cap: f64| model::vertex_growth(mesh, cap);
-        let all = growth(cap_of_all) * model::ray_factor(sampling, cap_of_all);
-        let rest = growth(cap_of_rest) - 1.0;
-        let leaves_enough = model::leaves_budget(sampling, allowed);
-        let lowers_sampling = sampling > cap_of_all && (all < rest || !leaves_enough);
-        let chosen = |(all, rest): (f64, f64)| if lowers_sampling { all } else { rest };
-        let cap = chosen((cap_of_all, cap_of_rest));
-        // Bounces take few rays: where they leave more of the error to the elements, these have
-        // less to be split.
-        let saved = growth(cap) - growth(chosen(caps(0.0)));
+        // With more rays every vertex gathers again; finer elements alone may cost less.
+        let cap_with_rays = cap(bounces, true);
+        let cost_with_rays = growth(cap_with_rays) * model::ray_factor(sampling, cap_with_rays);
+        let cost_of_mesh = growth(cap(bounces, false)) - 1.0;
+        let lowers_sampling = sampling > cap_with_rays
+            && (cost_with_rays < cost_of_mesh || !model::leaves_budget(sampling, allowed));
+        // All further bounces take few rays, and leave more of the error to the elements.
+        let saved = growth(cap(bounces, lowers_sampling)) - growth(cap(0.0, lowers_sampling));
+        let cap = cap(bounces, lowers_sampling);
         Steps {
             sampling: lowers_sampling
                 .then(|| (model::ray_step(sampling, cap), model::noise_step(sampling, cap))),
             mesh: (mesh > cap).then(|| model::mesh_step(mesh, cap)),
-            bounce: bounces > cap || saved > model::BOUNCE_COST,
+            bounce: bounces > cap || saved > 1.0 / f64::from(model::COARSE_RAY_DIVISOR),
         }
     }
 
@@ -268,8 +267,8 @@ mod tests {
         ErrorTarget { error, each_group, overrides: &|_| () }
     }
 
-    fn judged<'e>(whole: &'e ErrorEstimate, groups: &'e [GroupError]) -> Judged<'e> {
-        Judged { whole, by_light: whole, groups }
+    fn errors<'e>(whole: &'e ErrorEstimate, groups: &'e [GroupError]) -> TargetErrors<'e> {
+        TargetErrors { whole, by_light: whole, groups }
     }
 
     #[test]
@@ -278,11 +277,11 @@ mod tests {
         let [met, missed] =
             [0.001, 0.1].map(|mesh| ErrorEstimate { total: mesh, mesh, ..Default::default() });
         let target = target(0.02, false);
-        let by_light = Judged { whole: &met, by_light: &missed, groups: &[] };
+        let by_light = TargetErrors { whole: &met, by_light: &missed, groups: &[] };
         assert!(!target.is_met(by_light) && target.is_reached(by_light, false));
         let new = refined(&gather, by_light, &target);
         assert!(new.refinement.min_edge < gather.refinement.min_edge);
-        let dark = Judged { whole: &missed, by_light: &met, groups: &[] };
+        let dark = TargetErrors { whole: &missed, by_light: &met, groups: &[] };
         assert!(!target.is_met(dark) && !target.is_reached(dark, false));
     }
 
@@ -296,7 +295,7 @@ mod tests {
             (ErrorEstimate { sampling: 0.05, ..small }, Step::AllVertices { bounce: false }),
         ];
         for (estimate, step) in cases {
-            let new = refined(&gather, judged(&estimate, &[]), &target(0.02, false));
+            let new = refined(&gather, errors(&estimate, &[]), &target(0.02, false));
             assert_eq!(Step::between(&gather, &new), step, "{estimate:?}");
             let finer = new.refinement.mesh_error < gather.refinement.mesh_error;
             assert_eq!(finer, estimate.mesh > 0.0);
@@ -309,13 +308,13 @@ mod tests {
         // A bounce comes first, and alone: it changes what there is to split and to cast.
         for (mesh, sampling) in [(0.05, 0.0), (0.0, 0.05)] {
             let both = ErrorEstimate { mesh, sampling, truncation: 0.05, ..small };
-            let new = refined(&gather, judged(&both, &[]), &target(0.02, false));
+            let new = refined(&gather, errors(&both, &[]), &target(0.02, false));
             assert_eq!(Step::between(&gather, &new), Step::Bounces);
             assert_eq!(new.refinement.mesh_error, gather.refinement.mesh_error);
             assert_eq!(new.rays, gather.rays);
         }
         let met = ErrorEstimate { mesh: 0.01, sampling: 0.005, ..small };
-        let new = refined(&gather, judged(&met, &[]), &target(0.02, false));
+        let new = refined(&gather, errors(&met, &[]), &target(0.02, false));
         assert_eq!(new, gather, "0.0112 is below 0.9 · 0.85 · 0.02");
     }
 
@@ -329,7 +328,7 @@ mod tests {
         for (truncation, wanted) in [(0.04, Step::Bounces), (0.02, Step::Split)] {
             let estimate =
                 ErrorEstimate { total: 0.5, mesh: 0.09, truncation, ..Default::default() };
-            let new = refined(&gather, judged(&estimate, &[]), &target);
+            let new = refined(&gather, errors(&estimate, &[]), &target);
             assert_eq!(Step::between(&gather, &new), wanted, "{truncation}");
         }
     }
@@ -341,7 +340,7 @@ mod tests {
         let cases = [(0.05, 0.0, false), (0.05, 0.0047, false), (0.05, 0.0049, true)];
         for (mesh, truncation, wanted) in cases {
             let estimate = ErrorEstimate { total: 0.5, mesh, truncation, ..Default::default() };
-            let new = with_bounces(&gather, judged(&estimate, &[]), &target(0.02, false));
+            let new = with_bounces(&gather, errors(&estimate, &[]), &target(0.02, false));
             let is_bounce = new != gather && Step::between(&gather, &new) == Step::Bounces;
             assert_eq!(is_bounce, wanted, "{estimate:?}");
             let same = GatherSettings { refinement: gather.refinement.clone(), ..new };
@@ -357,11 +356,11 @@ mod tests {
         // Allowed are 0.0153. Sampling alone is above half of that squared, but to lower the mesh
         // beside it takes (0.012/0.0095)^1.6 = 1.5 times the vertices, less than to cast all
         // again.
-        let new = refined(&gather, judged(&of(0.012, 0.012), &[]), &target(0.02, false));
+        let new = refined(&gather, errors(&of(0.012, 0.012), &[]), &target(0.02, false));
         assert_eq!(Step::between(&gather, &new), Step::Split);
         assert!(new.refinement.mesh_error < gather.refinement.mesh_error);
         // Where next to nothing is left for the mesh, rays are cheaper.
-        let new = refined(&gather, judged(&of(0.0152, 0.012), &[]), &target(0.02, false));
+        let new = refined(&gather, errors(&of(0.0152, 0.012), &[]), &target(0.02, false));
         assert_eq!(Step::between(&gather, &new), Step::AllVertices { bounce: false });
     }
 
@@ -375,29 +374,29 @@ mod tests {
         let groups = [group(1, met), group(3, missed)];
         for each_group in [false, true] {
             let target = target(0.02, each_group);
-            assert_eq!(target.is_met(judged(&met, &groups)), !each_group);
-            let new = refined(&gather, judged(&met, &groups), &target);
+            assert_eq!(target.is_met(errors(&met, &groups)), !each_group);
+            let new = refined(&gather, errors(&met, &groups), &target);
             if each_group {
                 let factors = &new.refinement.group_factors;
-                assert_eq!(factors[..], [1.0, 1.0, 1.0, model::MIN_MESH_STEP]);
+                assert_eq!(factors[..], [1.0, 1.0, 1.0, 0.5]);
             } else {
                 assert_eq!(new, gather);
             }
         }
         // What is uncertain takes more points, if these can decide.
         let wide = ErrorEstimate { uncertainty: 0.02, ..met };
-        assert!(target(0.02, true).is_undecided(judged(&met, &[group(0, wide)])));
-        assert!(!target(0.02, true).is_undecided(judged(&met, &groups)));
-        assert!(!target(0.02, false).is_undecided(judged(&met, &[group(0, wide)])));
+        assert!(target(0.02, true).is_undecided(errors(&met, &[group(0, wide)])));
+        assert!(!target(0.02, true).is_undecided(errors(&met, &groups)));
+        assert!(!target(0.02, false).is_undecided(errors(&met, &[group(0, wide)])));
         let close = ErrorEstimate { total: 0.0175, uncertainty: 0.001, ..met };
-        assert!(target(0.02, false).is_undecided(judged(&close, &[])));
-        assert!(!target(0.01, false).is_undecided(judged(&close, &[])));
+        assert!(target(0.02, false).is_undecided(errors(&close, &[])));
+        assert!(!target(0.01, false).is_undecided(errors(&close, &[])));
     }
 
     #[test]
     fn pilot_chooses_rays_by_sampling_law() {
         let gather = settings();
-        let allowed = model::SAMPLING_SHARE * model::allowed_error(0.02);
+        let allowed = model::allowed_sampling(0.02);
         let rays = |sampling: f64| with_rays_for(&gather, sampling, 0.02).rays;
         assert_eq!(rays(allowed), gather.rays.next_power_of_two());
         for sampling in [1.2, 2.0, 4.0, 9.0].map(|times| times * allowed) {

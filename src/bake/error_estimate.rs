@@ -21,13 +21,16 @@
 //! find, since light that is off in a gap of bright walls stays there. Light not shot is added as
 //! if it fell like the ambient term. This file does no gathering: see
 //! [`estimator`](super::estimator). Where the light that is gathered is itself off, no gather shows
-//! it; the [`judge`](super::judge) has paths for that.
+//! it; the [`validator`](super::validator) has paths for that.
 
 use glam::DVec3;
 
 use crate::accuracy::tail::{Ranking, Trimmed};
-use crate::bake::model;
 use crate::scene::Rgb;
+
+/// Variance of the mean of two gathers over that of one, and of the linear interpolant between
+/// three vertices of independent errors over that of one of them (∫ Σ λᵢ² over a triangle = 1/2).
+pub(super) const AVERAGED_VARIANCE: f64 = 0.5;
 
 /// An estimate of the error of vertex radiosity.
 ///
@@ -38,7 +41,7 @@ use crate::scene::Rgb;
 pub struct ErrorEstimate {
     /// All parts together.
     pub total: f64,
-    /// Standard error of the total, since it is found at random points.
+    /// Standard error of the total, by the scatter of the random points.
     pub uncertainty: f64,
     /// Root mean square over the tail, which the total leaves out.
     pub tail: f64,
@@ -85,7 +88,7 @@ pub struct GroupError {
     pub tail_share: f64,
 }
 
-/// What was found at a random point of the surface.
+/// Gathers at a random point of the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Observation {
     /// Index of the stratum that the point stands for.
@@ -105,7 +108,7 @@ pub(super) struct Observation {
     /// Whether the point is hidden by what touches its surface or encloses it, so that nobody sees
     /// it, or sees next to nothing itself.
     pub excluded: bool,
-    /// Share of the hemisphere in which nothing is seen.
+    /// Share of the hemisphere without surfaces.
     pub escaped: f64,
 }
 
@@ -120,7 +123,7 @@ pub(super) struct Stratum {
     pub ambient: f64,
 }
 
-/// What is known of the scene and of the solve.
+/// Properties of the scene and of the solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conditions<'a> {
     pub strata: &'a [Stratum],
@@ -237,7 +240,7 @@ pub(super) fn estimate(observations: &[Observation], conditions: &Conditions) ->
     let further = FurtherBounces::new(&Means(&all), conditions);
     let parts = |strata: &mut [StratumDeviations], standard_errors: f64| {
         let tail = split_off_tail(strata, &further, conditions.tail);
-        parts(strata, further, passed, (standard_errors, tail), conditions)
+        parts(strata, further, passed, standard_errors, tail, conditions)
     };
     let lit_floor = lit_floor(&Means(&all), conditions);
     let mut lit: Vec<StratumDeviations> = all.iter().map(|s| s.by_light(lit_floor)).collect();
@@ -277,7 +280,7 @@ fn split_off_tail(strata: &mut [StratumDeviations], further: &FurtherBounces, ta
 /// the gathers, as far as that is known.
 fn tail_square(stratum: &StratumDeviations, further: &FurtherBounces) -> f64 {
     let of_point = |d: &Deviation| {
-        let square = further.error_square(d) - model::HALF * d.noise;
+        let square = further.error_square(d) - AVERAGED_VARIANCE * d.noise;
         d.area * (1.0 - d.kept) * square.max(0.0)
     };
     stratum.deviations.iter().map(of_point).sum()
@@ -308,13 +311,15 @@ fn lit_floor(means: &Means, conditions: &Conditions) -> f64 {
     (conditions.floor * mean).max(f64::MIN_POSITIVE)
 }
 
-/// All parts over `strata`, with so many standard errors added to what scatters most, and cut off
-/// from the tail at this square; `passed` is the share of the unshot light that bounces keep.
+/// All parts over `strata`, with `standard_errors` added to the squares of the interpolation; the
+/// tail is cut off at the square `cut`, and `passed` is the share of the unshot light that bounces
+/// keep.
 fn parts(
     strata: &[StratumDeviations],
     further: FurtherBounces,
     passed: f64,
-    (standard_errors, cut): (f64, f64),
+    standard_errors: f64,
+    cut: f64,
     conditions: &Conditions,
 ) -> ErrorEstimate {
     let means = Means(strata);
@@ -322,8 +327,10 @@ fn parts(
     let square = |d: &Deviation| d.interpolation.length_squared();
     // The largest errors are at rare points.
     let squares = means.of(square) + standard_errors * means.standard_error(cut, square);
-    let interpolation = (squares - model::HALF * noise).max(model::MIN_ERROR_SHARE * squares);
-    let sampling = (model::HALF * noise).min(model::MAX_SAMPLING_SHARE * interpolation);
+    // A difference of two estimates may be negative: a tenth of the squares remains, and of that
+    // 0.3 are the mesh's, whose own error noise hides.
+    let interpolation = (squares - AVERAGED_VARIANCE * noise).max(0.1 * squares);
+    let sampling = (AVERAGED_VARIANCE * noise).min(0.7 * interpolation);
     let mesh = interpolation - sampling;
     let area: f64 = strata.iter().map(StratumDeviations::area).sum();
     let area = area.max(f64::MIN_POSITIVE);

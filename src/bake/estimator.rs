@@ -1,13 +1,13 @@
 //! Random points that observe how far off a result is.
 //!
-//! Points are spread over the groups of the scene, so that none is hidden by a larger one, and over
-//! the reflecting area of each: a quarter of them evenly, a quarter evenly over octaves of distance
-//! (where all is near, that is the same), half where elements are expected to be off most of what
-//! is darkest in them, since few places make up most of a root mean square: by their residuals, or
-//! by a jump of the light between their corners. Each gathers twice what lit the result, the second
-//! time from a hair beside, where rays and hemicubes are rotated otherwise; and once the result
-//! itself. The [statistics](super::error_estimate) of that are the estimate; the share of each
-//! vertex follows the residuals of the elements around it.
+//! Points are spread over the groups of the scene, and over the reflecting area of each: a quarter
+//! of them uniformly, a quarter uniformly over octaves of distance, and half in proportion to the
+//! expected error of elements relative to their darkest corner, since a small area has most of the
+//! squared error: by their residuals, or by a jump of the light between their corners. Each point
+//! gathers the sources of the result twice, the second time 0.1 % of the element's size beside,
+//! where rays and hemicubes have another rotation; and once the result itself. The
+//! [statistics](super::error_estimate) of these are the estimate; the share of each vertex follows
+//! the residuals of the elements around it.
 
 use std::ops::ControlFlow;
 
@@ -15,9 +15,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::accuracy::Measure;
-use crate::bake::controller::Judged;
+use crate::bake::controller::TargetErrors;
 use crate::bake::error_estimate::{
-    self, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError, Observation, Stratum,
+    self, AVERAGED_VARIANCE, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError,
+    Observation, Stratum,
 };
 use crate::bake::model;
 use crate::bake::strata::{SampleCounts, SampledPart, strata_of};
@@ -37,24 +38,17 @@ use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
 use crate::visibility::ray_scene::Hit;
 
-/// How far points are drawn towards the centroid of their face, a share of the way: on a side,
-/// where walls meet, it is undefined what is seen.
-const INSET: f64 = 0.03;
-
-/// Reflected radiosity over the largest exitance, at and below which there is none: ten thousand
-/// times the rounding of their sum.
-const NEGLIGIBLE_REFLECTION: f64 = 1e-12;
-
-/// Reflected radiosity at and below which there is none in `scene`, W/m².
+/// Reflected radiosity at and below which there is none in `scene`, W/m²: 1e-12 of the largest
+/// exitance, ten thousand times the rounding of their sum.
 pub(super) fn negligible_reflection(scene: &Scene) -> f64 {
     let brightest = scene.materials().iter().map(|m| m.exitance.length()).fold(0.0, f64::max);
-    (NEGLIGIBLE_REFLECTION * brightest).max(f64::MIN_POSITIVE)
+    (1e-12 * brightest).max(f64::MIN_POSITIVE)
 }
 
-/// Whether an estimate goes on after so many `samples`: of a bake that was stopped until there are
-/// the least there are of any other, for what is told of it is to hold, too.
+/// Whether an estimate continues after `samples` points: of a bake that was stopped, up to the
+/// minimum of any other.
 pub(super) fn goes_on(stopped: bool, samples: usize) -> ControlFlow<()> {
-    let enough = stopped && samples >= *model::SAMPLES.start();
+    let enough = stopped && samples >= model::MIN_SAMPLES;
     if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
@@ -75,8 +69,8 @@ pub(super) struct ErrorEstimator<'a> {
     pub diagonal: f64,
     /// Over which points are spread.
     pub octaves: &'a Octaves,
-    /// Reflected radiosity below which errors are relative to this instead, W/m², as far as is
-    /// known before the points are looked at; they say it better.
+    /// Reflected radiosity below which errors are relative to this instead, W/m²; replaced by that
+    /// of the points.
     pub expected_floor: f64,
     /// Follows paths through the scene; not needed for the elements' own light.
     pub paths: Option<&'a PathTracer<'a>>,
@@ -93,7 +87,7 @@ pub(super) struct EstimatedError {
     pub vertices: Vec<f64>,
 }
 
-/// What a few points tell before any vertex has gathered.
+/// Noise and floor by a few points, before any vertex has gathered.
 pub(super) struct Pilot {
     /// Root mean square error, relative, of what vertices interpolate to because the gatherer casts
     /// so many rays and not more.
@@ -103,9 +97,9 @@ pub(super) struct Pilot {
 }
 
 impl EstimatedError {
-    /// What a target judges.
-    pub fn judged(&self) -> Judged<'_> {
-        Judged { whole: &self.whole, by_light: &self.by_light, groups: &self.groups }
+    /// The errors that are compared with a target.
+    pub fn errors(&self) -> TargetErrors<'_> {
+        TargetErrors { whole: &self.whole, by_light: &self.by_light, groups: &self.groups }
     }
 }
 
@@ -139,8 +133,8 @@ struct SampleGathers {
 }
 
 impl ErrorEstimator<'_> {
-    /// Gathers at random points, and gives the estimate. `progress` is told how many points are
-    /// done of how many, and may stop: they are enough then.
+    /// Gathers at random points, and gives the estimate. `progress` gets the number of points done
+    /// and in total, and may stop: the estimate is by those done.
     pub fn estimate(
         &self,
         counts: SampleCounts,
@@ -182,7 +176,7 @@ impl ErrorEstimator<'_> {
         Ok((strata, observations))
     }
 
-    /// What `count` points tell.
+    /// Noise and floor by `count` points.
     pub fn pilot(&self, count: usize, gatherer: &mut dyn Gather) -> Result<Pilot, Error> {
         let counts = SampleCounts { total: count, per_group: model::SAMPLES_PER_GROUP };
         let mut proceed = |_, _| ControlFlow::Continue(());
@@ -200,7 +194,7 @@ impl ErrorEstimator<'_> {
             }
         }
         let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
-        let sampling = (model::HALF * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt();
+        let sampling = (AVERAGED_VARIANCE * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt();
         Ok(Pilot { sampling, radiosity_floor })
     }
 
@@ -283,86 +277,22 @@ impl ErrorEstimator<'_> {
         };
         let mut rng = random_numbers(&[k as u64]);
         let path = |_| paths.later_bounces(change, &sample.on_surface, &mut rng);
-        (0..model::LATER_PATHS).map(path).sum::<Rgb>() / f64::from(model::LATER_PATHS)
+        // Noise is averaged over all points.
+        let paths_per_point = 16;
+        (0..paths_per_point).map(path).sum::<Rgb>() / f64::from(paths_per_point)
     }
 
     /// Points spread over groups and over the faces of each that reflect, and the strata
     /// that they stand for. Residuals are relative to no less than `floor`, W/m².
     fn samples(&self, counts: SampleCounts, floor: f64) -> (Vec<Stratum>, Vec<Sample>) {
-        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
-        let corners = |f: &[u32; 3]| f.map(|v| surface.positions[v as usize]);
-        let area = |f: &[u32; 3]| {
-            let [a, b, c] = corners(f);
-            (b - a).cross(c - a).length() / 2.0
+        let mut parts = self.parts(floor);
+        let scene = self.light.mesh.scene();
+        let placement = Placement {
+            light: self.light,
+            above: SurfaceOffset::new(scene),
+            rotations: CellRotation::new(&scene.bounds()),
         };
-        let above = SurfaceOffset::new(mesh.scene());
-        let inset = |place: [f64; 2]| place.map(|b| b + (1.0 / 3.0 - b) * INSET);
-        let rotations = CellRotation::new(&mesh.scene().bounds());
-        let sample = |stratum: usize, weight: f64, part: &SampledPart, barycentric: [f64; 2]| {
-            let element = surface.elements[part.face as usize] as usize;
-            let face = &surface.faces[part.face as usize];
-            let node = mesh.element(element);
-            let at =
-                |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
-            let is_solid = |&place: &[f64; 2]| mesh.is_solid(node, at(place)(corners(face)));
-            let in_face = |place| part.part.place(inset(place));
-            let [u, v] = shifted(barycentric).map(in_face).find(is_solid)?;
-            let mix = at([u, v]);
-            let material = mesh.material(node);
-            let size = mesh.area(node).sqrt();
-            // Next to a side, another surface may be nearer than what a point of this size sees.
-            let inset = 3.0 * u.min(v).min(1.0 - u - v);
-            let position = mix(corners(face));
-            let point = above.gather_point(position, mesh.normal(node), size * inset);
-            let interpolated = |values: &[Rgb]| mix(face.map(|v| values[v as usize]));
-            // Of the light, whatever textures are.
-            let reflected = if mesh.scene().has_textures() {
-                material.albedo() * interpolated(&surface.irradiance)
-            } else {
-                interpolated(&surface.radiosity) - material.exitance
-            };
-            Some(Sample {
-                stratum,
-                weight,
-                element,
-                albedo: material.albedo(),
-                point: TwoSidedPoint::new(point, material),
-                on_surface: PathStart { triangle: mesh.triangle(node), position },
-                inward: corners(face).iter().sum::<DVec3>() / 3.0 - position,
-                interpolated: reflected,
-                size,
-                rotation: rotations.at(point.position, point.near),
-            })
-        };
-        let with_parts_of = |mut parts: Vec<SampledPart>, face: usize| {
-            let vertices = &surface.faces[face];
-            let element = surface.elements[face] as usize;
-            let node = mesh.element(element);
-            if !mesh.scatters(node) {
-                return parts;
-            }
-            let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
-            let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
-            let [a, b, c] = light.map(Rgb::length);
-            let (darkest, brightest) = (a.min(b).min(c), a.max(b).max(c));
-            let jump = RMS_OVER_JUMP * (brightest - darkest);
-            let expected = |residual: &f64| residual.max(jump) / darkest.max(floor);
-            let error = self.element_residual.get(element).map_or(0.0, expected);
-            let solid = mesh.solid_share(node);
-            let mut take = |part: Part| {
-                let (error, flux) = (part.area * error, part.area * reflected);
-                let (face, group) = (face as u32, mesh.group(node));
-                parts.push(SampledPart { face, group, part, error, flux });
-            };
-            let area = solid * area(vertices);
-            self.octaves.for_each_part(corners(vertices), area, solid < 1.0, &mut take);
-            parts
-        };
-        let faces = (0..surface.faces.len()).into_par_iter();
-        let mut parts: Vec<SampledPart> =
-            faces.fold(Vec::new, with_parts_of).flatten_iter().collect();
-        let mut samples = vec![];
-        let mut strata = vec![];
+        let (mut samples, mut strata) = (vec![], vec![]);
         for (k, stratum) in strata_of(&mut parts, counts).into_iter().enumerate() {
             let parts = &parts[stratum.parts];
             let sum = |of: fn(&SampledPart) -> f64| parts.iter().map(of).sum::<f64>();
@@ -373,15 +303,54 @@ impl ErrorEstimator<'_> {
                 if error > 0.0 { (even + part.error / error) / 2.0 } else { even }
             };
             let sampler = AreaSampler::new(parts.iter().map(density));
-            let places = sampler.spread(stratum.samples, 0.5);
-            samples.extend(places.filter_map(|SurfacePoint { triangle, barycentric }| {
+            let points = sampler.spread(stratum.samples, 0.5);
+            samples.extend(points.filter_map(|SurfacePoint { triangle, barycentric }| {
                 let part = &parts[triangle];
                 let area = part.part.area / density(part);
-                sample(k, area / stratum.area / stratum.samples as f64, part, barycentric)
+                let weight = area / stratum.area / stratum.samples as f64;
+                placement.sample(k, weight, part, barycentric)
             }));
             strata.push(Stratum { group: stratum.group, area: stratum.area, ambient: 0.0 });
         }
         (strata, samples)
+    }
+
+    /// The faces that reflect, in parts by octaves of distance; residuals are relative to no less
+    /// than `floor`, W/m².
+    fn parts(&self, floor: f64) -> Vec<SampledPart> {
+        let faces = (0..self.light.surface.faces.len()).into_par_iter();
+        let with_parts_of = |mut parts: Vec<SampledPart>, face: usize| {
+            self.add_parts(&mut parts, face, floor);
+            parts
+        };
+        faces.fold(Vec::new, with_parts_of).flatten_iter().collect()
+    }
+
+    /// Adds the parts of a `face`, if it reflects.
+    fn add_parts(&self, parts: &mut Vec<SampledPart>, face: usize, floor: f64) {
+        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
+        let element = surface.elements[face] as usize;
+        let node = mesh.element(element);
+        if !mesh.scatters(node) {
+            return;
+        }
+        let light = self.light.corners[element].map(|v| self.light.reflected[v as usize]);
+        let reflected = (light.iter().sum::<Rgb>() / 3.0).length();
+        let [a, b, c] = light.map(Rgb::length);
+        let (darkest, brightest) = (a.min(b).min(c), a.max(b).max(c));
+        let jump = RMS_OVER_JUMP * (brightest - darkest);
+        let expected = |residual: &f64| residual.max(jump) / darkest.max(floor);
+        let error = self.element_residual.get(element).map_or(0.0, expected);
+        let solid = mesh.solid_share(node);
+        let mut add = |part: Part| {
+            let (error, flux) = (part.area * error, part.area * reflected);
+            let (face, group) = (face as u32, mesh.group(node));
+            parts.push(SampledPart { face, group, part, error, flux });
+        };
+        let corners = surface.faces[face].map(|v| surface.positions[v as usize]);
+        let [a, b, c] = corners;
+        let area = solid * ((b - a).cross(c - a).length() / 2.0);
+        self.octaves.for_each_part(corners, area, solid < 1.0, &mut add);
     }
 
     /// Fills in the mean square of the ambient term over the radiosity, or over `floor` (W/m²)
@@ -417,7 +386,7 @@ impl ErrorEstimator<'_> {
             let group = stratum.group.map(|g| g as usize);
             stratum.ambient = group.map_or(whole, |g| mean(squares[g], areas[g]));
         }
-        // Every bounce returns the largest albedo of what is left, at most.
+        // Every bounce keeps at most the largest albedo.
         let bound = self.ledger.unshot * max_albedo / (Rgb::ONE - max_albedo) / flux;
         if flux == Rgb::ZERO { 0.0 } else { bound.max_element() }
     }
@@ -441,9 +410,63 @@ impl ErrorEstimator<'_> {
             let residual = if area > 0.0 { sum / area } else { 0.0 };
             let mesh = residual * spread.per_residual * spread.per_residual;
             let even = (spread.even * radiosity.length()).powi(2);
-            model::TAIL_FACTOR * (mesh + even).sqrt()
+            // For 95 % of the vertices to be off by no more than twice this: the tails of errors
+            // are heavier than normal (1.8), and estimates leave out the tail of the area (1.12).
+            2.0 * (mesh + even).sqrt()
         };
         sums.into_iter().zip(&surface.radiosity).map(vertex_error).collect()
+    }
+}
+
+/// Places samples on the faces of a result.
+struct Placement<'a> {
+    light: &'a GatheredMesh,
+    above: SurfaceOffset,
+    rotations: CellRotation,
+}
+
+impl Placement<'_> {
+    /// The sample at, or next to, a `barycentric` point of `part`; none where that is in a hole.
+    fn sample(
+        &self,
+        stratum: usize,
+        weight: f64,
+        part: &SampledPart,
+        barycentric: [f64; 2],
+    ) -> Option<Sample> {
+        let (surface, mesh) = (&self.light.surface, &self.light.mesh);
+        let element = surface.elements[part.face as usize] as usize;
+        let face = &surface.faces[part.face as usize];
+        let (node, corners) = (mesh.element(element), face.map(|v| surface.positions[v as usize]));
+        let at = |[u, v]: [f64; 2]| move |[a, b, c]: [DVec3; 3]| a * (1.0 - u - v) + b * u + c * v;
+        // Off the sides, where walls meet and what is seen is undefined.
+        let inset = |point: [f64; 2]| point.map(|b| b + (1.0 / 3.0 - b) * 0.03);
+        let in_face = |point| part.part.place(inset(point));
+        let is_solid = |&point: &[f64; 2]| mesh.is_solid(node, at(point)(corners));
+        let [u, v] = shifted(barycentric).map(in_face).find(is_solid)?;
+        let mix = at([u, v]);
+        let (material, size, position) =
+            (mesh.material(node), mesh.area(node).sqrt(), mix(corners));
+        // Next to a side, another surface may be nearer than what a point of this size sees.
+        let inset = 3.0 * u.min(v).min(1.0 - u - v);
+        let point = self.above.gather_point(position, mesh.normal(node), size * inset);
+        let interpolated = |values: &[Rgb]| mix(face.map(|v| values[v as usize]));
+        Some(Sample {
+            stratum,
+            weight,
+            element,
+            albedo: material.albedo(),
+            point: TwoSidedPoint::new(point, material),
+            on_surface: PathStart { triangle: mesh.triangle(node), position },
+            inward: corners.iter().sum::<DVec3>() / 3.0 - position,
+            // Of the light, whatever textures are.
+            interpolated: match mesh.scene().has_textures() {
+                true => material.albedo() * interpolated(&surface.irradiance),
+                false => interpolated(&surface.radiosity) - material.exitance,
+            },
+            size,
+            rotation: self.rotations.at(point.position, point.near),
+        })
     }
 }
 
@@ -468,7 +491,7 @@ impl Sample {
         }
     }
 
-    /// A point a hair beside.
+    /// The point of the second gather.
     fn jittered(&self) -> TwoSidedPoint {
         self.point.beside(self.inward, self.size, self.rotation)
     }

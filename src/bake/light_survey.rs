@@ -1,6 +1,6 @@
-//! A quick look at where the light of a scene falls, before any is shot.
+//! Survey of the direct light of a scene, before any is shot.
 //!
-//! Points all over the surfaces that reflect look for the lights. Two things follow:
+//! 512 points on the surfaces that reflect gather by 32 rays each. Two things follow:
 //!
 //! - *The region of the light.* Sizes of elements are shares of its diagonal. It is the box around
 //!   all surfaces that reflect, unless nearly all direct light falls within a much smaller one, as
@@ -8,11 +8,13 @@
 //! - *The lights that are to be gathered.* Of the light of a room's lamp, most falls on the room:
 //!   the lamp shoots it. Of a black box of a kilometre that stands for the sky, next to nothing
 //!   falls on the house in its middle, and no hemicube of its patches resolves the house. Where
-//!   less than half of a light falls on anything that reflects, each element looks for it instead.
+//!   less than half of a light falls on anything that reflects, each element gathers it instead.
 //!
 //! Sky and luminaires light what sees them, and are always gathered.
 //!
 //! Both are by direct light alone: what is reflected seldom falls further.
+
+use glam::DVec3;
 
 use crate::backend::cpu::RayGather;
 use crate::gather::RadiosityField;
@@ -34,31 +36,10 @@ pub(super) struct LightSurvey {
 }
 
 /// A point of a surface that reflects, and the area that it stands for.
-struct Place {
+struct SurveyPoint {
     point: GatherPoint,
     area: f64,
 }
-
-/// Lights that are looked at, the strongest first; all others are shot. Chosen by hand: a scene
-/// with more has no sky among the weaker ones.
-const MAX_LIGHTS: usize = 12;
-
-/// Points that look for the lights.
-const PLACES: usize = 512;
-
-/// Rays over the hemisphere of each.
-const RAYS: u32 = 32;
-
-/// A light is gathered if less than this share of its flux falls on surfaces that reflect: it is
-/// then less work to look for it than to send most of it nowhere.
-const MIN_LANDING_SHARE: f64 = 0.5;
-
-/// Share of the direct light that may lie outside of the region, at either end of each axis.
-const TRIMMED_SHARE: f64 = 0.01;
-
-/// The region has to be this many times smaller than the box around all surfaces that reflect: in
-/// an ordinary room the light fills the room.
-const MIN_CONCENTRATION: f64 = 4.0;
 
 impl LightSurvey {
     /// Looks at `scene`.
@@ -67,41 +48,41 @@ impl LightSurvey {
         let mut survey =
             LightSurvey { region: None, diagonal: bounds.diagonal(), gathered_materials: vec![] };
         let lights = strongest_lights(scene);
-        let places = places(scene);
+        let points = survey_points(scene);
         // A scene with more triangles than a mesh may have elements is refused when it is cut.
         let is_too_large = scene.triangles().len() > Mesh::MAX_ELEMENTS;
         let has_others = scene.has_light_of_no_surface();
-        if (lights.is_empty() && !has_others) || places.is_empty() || is_too_large {
+        if (lights.is_empty() && !has_others) || points.is_empty() || is_too_large {
             return survey;
         }
-        // Direct light at each place: flux over the area that it stands for, W.
-        let mut flux = vec![0.0; places.len()];
+        // Direct light at each point: flux over the area that it stands for, W.
+        let mut flux = vec![0.0; points.len()];
         if has_others {
-            let seen = look(scene, &[], &places);
-            for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
-                *flux += place.area * seen.irradiance.length();
+            let seen = look(scene, &[], &points);
+            for ((flux, point), seen) in flux.iter_mut().zip(&points).zip(&seen) {
+                *flux += point.area * seen.irradiance.length();
             }
         }
         for first in (0..lights.len()).step_by(3) {
             let lights = &lights[first..lights.len().min(first + 3)];
-            let seen = look(scene, lights, &places);
+            let seen = look(scene, lights, &points);
             for (channel, light) in lights.iter().enumerate() {
                 let exitance = scene.materials()[light.material as usize].exitance.length();
                 let mut landing = 0.0;
-                for ((flux, place), seen) in flux.iter_mut().zip(&places).zip(&seen) {
+                for ((flux, point), seen) in flux.iter_mut().zip(&points).zip(&seen) {
                     let factor = seen.irradiance[channel];
-                    landing += place.area * factor;
-                    *flux += place.area * factor * exitance;
+                    landing += point.area * factor;
+                    *flux += point.area * factor * exitance;
                 }
-                if landing < MIN_LANDING_SHARE * light.area {
+                if landing < 0.5 * light.area {
                     survey.gathered_materials.push(light.material);
                 }
             }
         }
         survey.gathered_materials.sort_unstable();
-        if let Some(region) = region(&places, &flux)
-            && region.diagonal() * MIN_CONCENTRATION < bounds.diagonal()
-        {
+        let positions = points.iter().map(|point| point.point.position);
+        let flux: Vec<(DVec3, f64)> = positions.zip(flux).collect();
+        if let Some(region) = Aabb::concentrated(&flux, bounds.diagonal()) {
             survey.diagonal = region.diagonal();
             survey.region = Some(region);
         }
@@ -131,35 +112,37 @@ fn strongest_lights(scene: &Scene) -> Vec<MaterialLight> {
     let mut lights: Vec<MaterialLight> =
         (0..).zip(areas).map(light).filter(|light| light.flux > 0.0).collect();
     lights.sort_by(|a, b| b.flux.total_cmp(&a.flux).then(a.material.cmp(&b.material)));
-    lights.truncate(MAX_LIGHTS);
+    // All others are shot: no scene has a sky of surfaces among weaker ones.
+    lights.truncate(12);
     lights
 }
 
 /// Points spread over all surfaces that reflect: half by area, half by triangles, so that small
 /// surfaces get some beside large ones.
-fn places(scene: &Scene) -> Vec<Place> {
+fn survey_points(scene: &Scene) -> Vec<SurveyPoint> {
     let scatters = |&t: &usize| scene.material(t).scatters() && scene.solid_area(t) > 0.0;
     let triangles: Vec<usize> = (0..scene.triangles().len()).filter(scatters).collect();
     let area: f64 = triangles.iter().map(|&t| scene.solid_area(t)).sum();
     let density = |t: usize| 0.5 * scene.solid_area(t) / area + 0.5 / triangles.len() as f64;
     let sampler = AreaSampler::new(triangles.iter().map(|&t| density(t)));
     let above = SurfaceOffset::new(scene);
-    let place = |SurfacePoint { triangle, barycentric }: SurfacePoint| {
+    let count = 512;
+    let sample = |SurfacePoint { triangle, barycentric }: SurfacePoint| {
         let t = triangles[triangle];
         let [u, v] = scene.first_solid(t, shifted(barycentric)).unwrap_or(barycentric);
         let [a, b, c] = scene.corners(t);
         let position = a * (1.0 - u - v) + b * u + c * v;
         let size = scene.area(t).sqrt();
         let point = above.gather_point(position, scene.normal(t), size.min(area.sqrt() * 1e-3));
-        Place { point, area: scene.solid_area(t) / density(t) / PLACES as f64 }
+        SurveyPoint { point, area: scene.solid_area(t) / density(t) / f64::from(count) }
     };
-    sampler.spread(PLACES, 0.5).map(place).collect()
+    sampler.spread(count as usize, 0.5).map(sample).collect()
 }
 
-/// What each of `places` sees where each of up to three `lights` emits 1 W/m² in a channel of its
+/// What each of `points` sees where each of up to three `lights` emits 1 W/m² in a channel of its
 /// own and nothing else does: the irradiances are form factors, visible shares of the hemisphere,
 /// weighted by the cosine. With no lights what it sees of all that no surface emits.
-fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<IrradianceSample> {
+fn look(scene: &Scene, lights: &[MaterialLight], points: &[SurveyPoint]) -> Vec<IrradianceSample> {
     let mut materials: Vec<Material> = scene.materials().to_vec();
     for material in &mut materials {
         if material.clear_transmittance().is_none() {
@@ -177,9 +160,9 @@ fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<Irradi
         looked_at = looked_at.with_luminaires(vec![]).expect("none");
     }
     let mesh = Mesh::new(looked_at, f64::INFINITY).expect("no splits");
-    let points: Vec<GatherPoint> = places.iter().map(|place| place.point).collect();
+    let points: Vec<GatherPoint> = points.iter().map(|point| point.point).collect();
     let corners = vec![[0; 3]; mesh.element_count()];
-    let mut rays = RayGather::new(&mesh, RAYS).expect("a number of rays in range");
+    let mut rays = RayGather::new(&mesh, 32).expect("a number of rays in range");
     rays.gather(&dark(&mesh, &corners), &points).expect("rays do not fail")
 }
 
@@ -187,13 +170,6 @@ fn look(scene: &Scene, lights: &[MaterialLight], places: &[Place]) -> Vec<Irradi
 /// three zeros for each element.
 pub(super) fn dark<'a>(mesh: &'a Mesh, corners: &'a [[u32; 3]]) -> RadiosityField<'a> {
     RadiosityField { mesh, corners, reflected: &[Rgb::ZERO] }
-}
-
-/// The box that all but [`TRIMMED_SHARE`] of the `flux` at `places` falls in, at either end of each
-/// axis; none without light.
-fn region(places: &[Place], flux: &[f64]) -> Option<Aabb> {
-    let positions = places.iter().map(|place| place.point.position);
-    Aabb::around_most(&positions.zip(flux.iter().copied()).collect::<Vec<_>>(), TRIMMED_SHARE)
 }
 
 #[cfg(test)]

@@ -73,8 +73,7 @@ pub(super) fn run(
     let baked = match (&settings.gather, &source) {
         (Some(gather), Some(source)) => {
             let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
-            let halves = (settings.solve.clone(), gather.clone(), settings.measure);
-            GatherPhase::new(halves, target, mesh, source, &shot, backend)?
+            GatherPhase::new(settings, gather, target, mesh, source, &shot, backend)?
                 .run(&mut reporter, &mut clock)?
         }
         _ => shooting_phase::estimate_elements(

@@ -1,4 +1,4 @@
-//! What a bake tells while it works, and where its time goes.
+//! Progress of a bake, and wall time by stage.
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -1,7 +1,5 @@
-//! Where an element looks for the light that it receives before any is shot.
-//!
-//! Its middle stands for all of it, but for luminaires nearer than it is wide, whose light falls
-//! off within it: it is then looked for in the middles of its parts.
+//! Points at which an element gathers the light that it receives before any is shot: its centroid,
+//! or those of its parts where luminaires are nearer than twice its width.
 
 use glam::DVec3;
 
@@ -9,14 +7,6 @@ use crate::gather::GatherPoint;
 use crate::gather::gather_points::SurfaceOffset;
 use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Luminaire, longest_edge};
-
-/// Width of a part as a share of its distance from a luminaire, at most: at the foot of a point at
-/// height h the middle of a triangle of width w is 3 w²/24 h² = 3 % brighter than its mean, and
-/// elsewhere it is nearer to that.
-const MAX_WIDTH: f64 = 0.5;
-
-/// Times that an element is cut in four, at most.
-const MAX_LEVELS: u32 = 5;
 
 /// The points for `node` of `mesh`: one, or one for each of as many parts of equal area.
 pub(super) fn received_points(
@@ -29,7 +19,9 @@ pub(super) fn received_points(
     let nearest = |luminaire: &Luminaire| luminaire.distance_to_box(middle) - width / 2.0;
     let distances = mesh.scene().luminaires().iter().map(nearest);
     let distance = distances.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
-    let levels = (width / (MAX_WIDTH * distance)).log2().ceil().clamp(0.0, f64::from(MAX_LEVELS));
+    // Parts of width w at most half of their distance h: at the foot of a point light, the middle
+    // of one is 3 w²/24 h² = 3 % brighter than its mean.
+    let levels = (width / (0.5 * distance)).log2().ceil().clamp(0.0, 5.0);
     if levels == 0.0 {
         return vec![above.above_element(mesh, node)];
     }

@@ -1,8 +1,7 @@
 //! The first phase of a bake: light is shot on elements.
 //!
-//! The scene is cut into elements, more finely where surfaces touch. Rows of form factors come from
-//! the backend and are corrected for near receivers; a solver sends light along them. Given a
-//! checkpoint file the solve goes on from it.
+//! The scene is cut into elements. Rows of form factors come from the backend and are corrected for
+//! near receivers; a solver sends light along them. Given a checkpoint file the solve resumes it.
 //!
 //! ```text
 //! backend ─► ProximityCorrection ─► Solver ─► radiosity of elements
@@ -17,7 +16,6 @@ use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
-use crate::bake::judge::Judge;
 use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
@@ -26,6 +24,7 @@ use crate::bake::received_points::received_points;
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::bake::strata::SampleCounts;
+use crate::bake::validator::{self, Validator};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
@@ -37,9 +36,6 @@ use crate::progress::StopReason;
 use crate::scene::{Rgb, Scene};
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 use crate::verify::octaves_of;
-
-/// The solve goes on for so many times what writing a checkpoint takes, before the next is written.
-const CHECKPOINT_INTERVAL: u32 = 10;
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {
@@ -62,8 +58,7 @@ pub(super) fn shoot(
     clock: &mut StageClock,
 ) -> Result<ShotLight, Error> {
     let sizing = settings.sizing(scene, settings.element_size);
-    let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?
-        .split_at_contacts(settings.contact_levels);
+    let mesh = Mesh::sized(scene.clone(), &sizing, model::MAX_SHOOTING_DEPTH)?;
     let rows = backend.rows(&mesh, settings)?;
     let mut rows = ProximityCorrection::new(rows, &mesh, settings.near_reach);
     clock.timings.mesh = clock.lap();
@@ -166,7 +161,8 @@ fn solve_with_checkpoints(
     let mut saving_time = Duration::ZERO;
     loop {
         let stop = session.advance(rows, &mut *progress)?;
-        if stop.is_some() || saved.elapsed() >= CHECKPOINT_INTERVAL * saving_time {
+        // A tenth of the time at most is for writing.
+        if stop.is_some() || saved.elapsed() >= 10 * saving_time {
             let start = Instant::now();
             session.save(path)?;
             saved = Instant::now();
@@ -202,28 +198,28 @@ pub(super) fn estimate_elements(
         expected_floor: light.radiosity_field().radiosity_floor(settings.measure.floor),
         paths: None,
     };
-    let counts =
-        SampleCounts { total: *model::SAMPLES.start(), per_group: model::SAMPLES_PER_GROUP };
+    let counts = SampleCounts { total: model::MIN_SAMPLES, per_group: model::SAMPLES_PER_GROUP };
     // With settings to gather by, it was cancelled before vertices could.
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
-    let found = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
+    let estimated = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
         estimator::goes_on(cancelled, samples)
     })?;
-    let found = match target {
-        // What is told of a bake that was stopped is to hold, too.
+    let estimated = match target {
+        // The estimate of a bake that was stopped is validated, too.
         Some(target) if cancelled => {
-            Judge::new(shot.mesh.scene(), settings.measure, target.each_group).judge(
-                found,
+            Validator::new(shot.mesh.scene(), settings.measure, target.each_group).validate(
+                estimated,
                 &light,
-                (Some(target.error), [model::JUDGE_PATHS; 2]),
+                Some(target.error),
+                [validator::MIN_PATHS; 2],
                 &mut |_, _| ControlFlow::Continue(()),
             )
         }
-        _ => found,
+        _ => estimated,
     };
-    let is_reached = target.is_some_and(|target| target.is_reached(found.judged(), cancelled));
-    let EstimatedError { whole: estimate, groups, vertices, .. } = found;
+    let is_reached = target.is_some_and(|target| target.is_reached(estimated.errors(), cancelled));
+    let EstimatedError { whole: estimate, groups, vertices, .. } = estimated;
     light.surface.error = vertices;
     clock.timings.estimate = clock.lap();
     // The bake ends here, whatever the callback says.

@@ -8,8 +8,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::bake::model;
 use crate::sampling::octaves::Part;
+
+/// Groups that are strata of their own: the largest. All others are one stratum.
+const MAX_GROUPS: usize = 64;
 
 /// How many random points there are to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +68,7 @@ pub(super) fn strata_of(parts: &mut [SampledPart], counts: SampleCounts) -> Vec<
     let rank_of = |(rank, stratum): (usize, &StratumParts)| Some((stratum.group?, rank));
     let rank: FxHashMap<u32, usize> = by_group.iter().enumerate().filter_map(rank_of).collect();
     parts.par_sort_by_key(|part| rank[&part.group]);
-    let single = if counts.per_group > 0 { model::MAX_GROUPS } else { 0 };
+    let single = if counts.per_group > 0 { MAX_GROUPS } else { 0 };
     if by_group.len() > single.max(1) {
         let small = by_group.split_off(single);
         let area = small.iter().map(|s| s.area).sum();
@@ -105,13 +107,13 @@ mod tests {
 
     #[test]
     fn groups_beyond_the_largest_are_one_stratum() {
-        let count = model::MAX_GROUPS as u32 + 10;
+        let count = MAX_GROUPS as u32 + 10;
         let mut faces: Vec<SampledPart> =
             (0..count).map(|g| face(g, f64::from(g + 1), 1.0)).collect();
         let strata = strata_of(&mut faces, SampleCounts { total: 100, per_group: 1 });
-        assert_eq!(strata.len(), model::MAX_GROUPS + 1);
+        assert_eq!(strata.len(), MAX_GROUPS + 1);
         assert_eq!(strata[0].group, Some(count - 1), "the largest first");
-        let rest = &strata[model::MAX_GROUPS];
+        let rest = &strata[MAX_GROUPS];
         assert_eq!((rest.group, rest.parts.len(), rest.area), (None, 10, 55.0));
         let groups = faces[rest.parts.clone()].iter().map(|part| part.group);
         assert!(groups.eq((0..10).rev()), "the others, in one place");

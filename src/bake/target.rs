@@ -1,6 +1,6 @@
 //! What is asked of a bake: an error, or a time. All settings follow from it.
 
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -135,16 +135,13 @@ fn not_a_time(seconds: f64) -> Error {
     Error::new(ErrorKind::Setting, place, "not a time to work in", "give a time above 0")
 }
 
-/// Light that a bake knows the error of: squares of it, and sums of these, are within what numbers
-/// hold at either end.
-const LIGHT: RangeInclusive<f64> = 1e-32..=1e32;
-
-/// Checks the brightest light of `scene` in any channel, if there is some.
+/// Checks that squares of the brightest light of `scene` in any channel, and their sums, are in the
+/// range of numbers.
 fn check_light(scene: &Scene) -> Result<(), Error> {
     let surfaces = (0..scene.triangles().len()).map(|t| scene.exitance(t).max_element());
     let sun = scene.sky().sun().map_or(0.0, |sun| sun.irradiance.max_element());
     let brightest = surfaces.fold(scene.sky().brightest().max(sun), f64::max);
-    if brightest == 0.0 || LIGHT.contains(&brightest) {
+    if brightest == 0.0 || (1e-32..=1e32).contains(&brightest) {
         return Ok(());
     }
     let found = format!("the brightest is {brightest:e}");

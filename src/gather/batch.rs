@@ -1,4 +1,4 @@
-//! A batch of vertices that gather at once, and what follows for their values.
+//! A batch of vertices that gather at once.
 
 use rayon::prelude::*;
 
@@ -9,13 +9,13 @@ use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
 
-/// A batch of vertices, and what was gathered at one point of each.
+/// A batch of vertices, with a sample at one point of each.
 pub(super) struct Batch<'v> {
     pub vertices: &'v [u32],
     samples: Vec<IrradianceSample>,
 }
 
-/// What is known at the vertices, by their number.
+/// Values of vertices, by their number.
 pub(super) struct VertexValues<'s> {
     /// Reflected radiosity, W/m² per channel.
     pub reflected: &'s mut [Rgb],
@@ -30,11 +30,11 @@ pub(super) struct VertexValues<'s> {
 /// Gathers one point for each of `vertices`.
 pub(super) fn gather_batch<'v>(
     vertices: &'v [u32],
-    places: Vec<TwoSidedPoint>,
+    points: Vec<TwoSidedPoint>,
     source: &RadiosityField,
     gatherer: &mut dyn Gather,
 ) -> Result<Batch<'v>, Error> {
-    Ok(Batch { vertices, samples: gather_two_sided(gatherer, source, &places)? })
+    Ok(Batch { vertices, samples: gather_two_sided(gatherer, source, &points)? })
 }
 
 impl Batch<'_> {
@@ -47,13 +47,14 @@ impl Batch<'_> {
             .collect()
     }
 
-    /// Writes what was gathered at this `attempt` to the values of the vertices that it resolves.
-    /// All light is in a box of this
-    /// `diagonal`, scene unit; what `light` adds to it is kept by itself, too.
+    /// Writes the samples of this `attempt` to the values of the vertices that it resolves, and the
+    /// part of them that comes from `light` apart. The region of the light has this `diagonal`,
+    /// scene unit.
     pub fn apply(
         &self,
         points: &VertexGatherPoints,
-        (attempt, diagonal): (usize, f64),
+        attempt: usize,
+        diagonal: f64,
         light: Option<&DirectionalLight>,
         values: &mut VertexValues,
     ) {
@@ -81,8 +82,8 @@ impl Batch<'_> {
             Some((v, albedo * sample.irradiance, noise, [is_buried, is_hidden], direct))
         };
         let pairs = self.vertices.par_iter().zip(&self.samples);
-        let found: Vec<(u32, Rgb, f64, [bool; 2], Direct)> = pairs.filter_map(value).collect();
-        for (v, reflected, noise, [is_buried, is_hidden], direct) in found {
+        let resolved: Vec<(u32, Rgb, f64, [bool; 2], Direct)> = pairs.filter_map(value).collect();
+        for (v, reflected, noise, [is_buried, is_hidden], direct) in resolved {
             let v = v as usize;
             values.reflected[v] = reflected;
             values.noise[v] = noise;

@@ -18,11 +18,6 @@ use rayon::prelude::*;
 use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
 
-/// An extrapolated value is at least and at most this many times that of the neighbour that it is
-/// extrapolated from: gradients next to a contact are steep. Chosen by hand; no measurement kept.
-const MIN_RATIO: f64 = 0.5;
-const MAX_RATIO: f64 = 2.0;
-
 /// In the place of a vertex's number: it has none.
 const UNNUMBERED: usize = usize::MAX;
 
@@ -59,7 +54,8 @@ pub(super) fn extrapolate_into_buried(samples: &mut SampledMesh) {
                 let step = positions[v] - positions[w];
                 let value = samples.reflected[w];
                 let extrapolated = value + gradients[numbers[w]] * step;
-                let value = extrapolated.clamp(value * MIN_RATIO, value * MAX_RATIO);
+                // Gradients next to a contact are steep.
+                let value = extrapolated.clamp(value * 0.5, value * 2.0);
                 let sum = &mut sums[numbers[v]];
                 sum.0 += value / step.length();
                 sum.1 += 1.0 / step.length();

@@ -7,7 +7,7 @@
 //! ```text
 //!       ●  gather point: SURFACE_LIFT · size above the element
 //!       │
-//!   v───┼────── element ──────      │v → ·│ = CORNER_INSET · distance to the centroid
+//!   v───┼────── element ──────      │v → ·│ = 0.02 · distance to the centroid
 //! ```
 
 use glam::DVec3;
@@ -37,12 +37,7 @@ pub(crate) struct SurfaceOffset {
     min_offset: f64,
 }
 
-/// How far a vertex's gather point lies inside an element: a share of the way to its centroid. It
-/// keeps away from edges, whose two sides see different things. Chosen by hand; no measurement
-/// kept.
-const CORNER_INSET: f64 = 0.02;
-
-/// Elements around a vertex in which a gather point is tried, at most. Chosen by hand.
+/// Maximum number of elements around a vertex in which a gather point is tried.
 const MAX_ATTEMPTS: usize = 6;
 
 impl<'a> VertexGatherPoints<'a> {
@@ -104,7 +99,7 @@ impl<'a> VertexGatherPoints<'a> {
         let step = around.len().div_ceil(MAX_ATTEMPTS);
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
         let position = self.vertices.positions[v as usize];
-        let inset = (self.mesh.centroid(element) - position) * CORNER_INSET;
+        let inset = (self.mesh.centroid(element) - position) * 0.02;
         let (normal, size) = (self.normal(v), self.size(v));
         let point = self.offset.gather_point(position + inset, normal, size);
         TwoSidedPoint::new(point, self.material(v))

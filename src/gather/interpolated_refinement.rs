@@ -26,15 +26,6 @@ use crate::error::Error;
 use crate::scene::Rgb;
 use crate::vertex::keys::VertexKey;
 
-/// Errors of elements at a boundary of their surface, over what the surplus says: next to a wall
-/// light goes as d ln d with the distance d, for which halving h does not quarter the surplus, and
-/// which is no quadratic. Chosen by hand; no measurement kept.
-const BOUNDARY_FACTOR: f64 = 2.5;
-
-/// Share of an element's error that remains when its midsides are put on the quadratic
-/// interpolant. Chosen by hand; no measurement kept.
-const FOLLOWED_SHARE: f64 = 0.5;
-
 /// The refined mesh, and an estimate of the error that remains in each of its elements, W/m²: a
 /// length over the channels.
 pub(super) struct InterpolatedRefinement {
@@ -136,9 +127,11 @@ fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usiz
             None => source_nonlinearity(&samples.mesh, source, e),
         };
         let factor = if samples.corners()[e].iter().any(|&v| at_boundary[v as usize]) {
-            BOUNDARY_FACTOR
+            // Next to a wall light goes as d ln d with the distance d, which is no quadratic, and
+            // half of whose side h has more than a quarter of the surplus.
+            2.5
         } else if is_split(e) {
-            FOLLOWED_SHARE
+            0.5
         } else {
             1.0
         };

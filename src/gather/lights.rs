@@ -48,21 +48,13 @@ pub(crate) struct Lights {
 /// In place of a light's index, for triangles that do not emit. Shaders know the value.
 pub(crate) const NO_LIGHT: u32 = u32::MAX;
 
-/// Lights that are sampled explicitly from one point, at most. Shaders know the value. Chosen by
-/// hand: cost is linear in it.
+/// Maximum number of lights that are sampled explicitly from one point; cost is linear in it.
+/// Shaders know the value.
 pub(crate) const MAX_EXPLICIT_LIGHTS: usize = 8;
 
 /// Lights whose unoccluded irradiance is below this share of that of all lights are not sampled
-/// explicitly. Chosen by hand; no measurement kept.
+/// explicitly: rays over the hemisphere find them.
 const MIN_IRRADIANCE_SHARE: f64 = 1e-3;
-
-/// Triangles of a light, up to which it is tested for convexity, which takes quadratic time; larger
-/// lights count as not convex. Chosen by hand.
-const MAX_CONVEX_TRIANGLES: usize = 1024;
-
-/// How far a corner may lie in front of a triangle's plane in a convex light, in units of the
-/// light's extent: above the rounding of coordinates. Chosen by hand.
-const COPLANAR_TOLERANCE: f64 = 1e-9;
 
 impl Lights {
     /// Finds the lights of `scene`.
@@ -137,12 +129,14 @@ fn connected_emitters(scene: &Scene, emitters: &[usize]) -> Vec<usize> {
     (0..emitters.len()).map(|k| emitters[sets.find(k)]).collect()
 }
 
+/// Whether no corner lies in front of a triangle's plane by more than rounding, 1e-9 of the extent.
+/// Lights of more than 1024 triangles count as not convex, since the test takes quadratic time.
 fn is_convex(scene: &Scene, triangles: &[u32]) -> bool {
     let corners: Vec<_> = triangles.iter().flat_map(|&t| scene.corners(t as usize)).collect();
     let extent = corners.iter().map(|p| p.distance(corners[0])).fold(0.0, f64::max);
-    triangles.len() <= MAX_CONVEX_TRIANGLES
+    triangles.len() <= 1024
         && triangles.iter().all(|&t| {
             let (normal, on) = (scene.normal(t as usize), scene.corners(t as usize)[0]);
-            corners.iter().all(|p| normal.dot(p - on) <= COPLANAR_TOLERANCE * extent)
+            corners.iter().all(|p| normal.dot(p - on) <= 1e-9 * extent)
         })
 }

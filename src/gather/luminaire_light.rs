@@ -34,16 +34,9 @@ pub(crate) struct LuminaireLight<'a> {
 /// sends is then 1e-7 of it at most.
 const POINT_DISTANCE: f64 = 1e3;
 
-/// Rays to an opening: at first, and where not all of them are free or hidden. Chosen by hand: an
-/// edge of a shadow then has some forty steps, and less noise than the penumbra has slope between
-/// vertices.
+/// Rays to an opening: initially, and in total where some of them are occluded. A penumbra then has
+/// about forty steps, and noise below its change between vertices.
 const RAYS: [u32; 2] = [16, 256];
-
-/// Panels along a side of an opening, at most. Chosen by hand.
-const MAX_PANELS: f64 = 16.0;
-
-/// The rule of one point.
-const MIDDLE: [Node; 1] = [Node { x: 0.5, weight: 1.0 }];
 
 impl LuminaireLight<'_> {
     /// Irradiance at `point`, W/m² per channel.
@@ -119,7 +112,7 @@ impl LuminaireLight<'_> {
 /// scale.
 ///
 /// Each side of the opening is cut into panels that are half as long as the opening is far, or as
-/// many as there may be, with three Gauss points each: where intensity is smooth the error is
+/// 16, with three Gauss points each: where intensity is smooth the error is
 /// about 8⁻⁶ = 4e-6 (see [`crate::geometry::quadrature`]).
 fn unoccluded(luminaire: &Luminaire, at: DVec3, normal: DVec3) -> f64 {
     if luminaire.extent() * POINT_DISTANCE <= luminaire.position.distance(at) {
@@ -129,7 +122,7 @@ fn unoccluded(luminaire: &Luminaire, at: DVec3, normal: DVec3) -> f64 {
     let DVec3 { x, y, z } = luminaire.opening.size;
     // Around a round one the second coordinate is an angle, of four panels at least.
     let sides = if luminaire.opening.is_round { [x.max(y), PI * x.max(y), z] } else { [x, y, z] };
-    let panels = |side: f64| (2.0 * side / distance).ceil().min(MAX_PANELS) as u32;
+    let panels = |side: f64| (2.0 * side / distance).ceil().min(16.0) as u32;
     let mut panels = sides.map(panels);
     if luminaire.opening.is_round {
         panels[1] = panels[1].max(4);
@@ -150,7 +143,8 @@ fn unoccluded(luminaire: &Luminaire, at: DVec3, normal: DVec3) -> f64 {
 
 /// Three Gauss points in each of `panels` parts of [0, 1]; its middle where there is none.
 fn nodes(panels: u32) -> impl Iterator<Item = Node> + Clone {
-    let rule: &[Node] = if panels == 0 { &MIDDLE } else { &GAUSS_LEGENDRE_3 };
+    let middle: &[Node] = &[Node { x: 0.5, weight: 1.0 }];
+    let rule = if panels == 0 { middle } else { &GAUSS_LEGENDRE_3 };
     let width = 1.0 / f64::from(panels.max(1));
     (0..panels.max(1)).flat_map(move |k| {
         let in_panel = move |node: &Node| Node {

@@ -1,8 +1,8 @@
 //! Irradiance at points anywhere: on surfaces or in the air, each with its standard error.
 //!
-//! A point gathers four times, from heights a hair apart. Each is another cell of the rotation, so
-//! that rays look elsewhere, while the light is the same. The mean is the irradiance,
-//! and how far the four are apart its standard error:
+//! A point gathers four times, from slightly different heights. Each is another cell of the
+//! rotation, so that directions differ while the light is the same. The mean is the irradiance, and
+//! the scatter of the four gives its standard error:
 //!
 //! ```text
 //!    ●  E_3        E = (E_0 + E_1 + E_2 + E_3) / 4
@@ -26,13 +26,6 @@ use crate::visibility::buried;
 /// degrees of freedom it is below a tenth of the true one once in 700 times; of two gathers, with
 /// one degree, it is so once in twelve.
 const GATHERS: usize = 4;
-
-/// Least rays of one gather, and most before more are cast where they disagree. Chosen by hand.
-const RAYS: (f64, f64) = (32.0, 16384.0);
-
-/// Rays of one gather times the relative noise asked for, before it is known where they disagree:
-/// of all gathers together those that a bake begins with at a vertex.
-const RAYS_TIMES_NOISE: f64 = 5.0;
 
 /// Irradiance at a point, and how well it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -125,10 +118,11 @@ pub(crate) fn two_sided_irradiance_at(
     Ok(Some(found))
 }
 
-/// About how many rays each gather of a point begins with for a relative `noise` of their mean, and
-/// the noise that is allowed to each.
+/// Initial number of rays of each gather of a point for a relative `noise` of their mean, and the
+/// noise that is allowed to each. All gathers together cast about the initial rays of a vertex of a
+/// bake, 20 over the error; more are cast where they disagree.
 pub(crate) fn rays_for_noise(noise: f64) -> (u32, f64) {
-    let rays = (RAYS_TIMES_NOISE / noise).clamp(RAYS.0, RAYS.1);
+    let rays = (5.0 / noise).clamp(32.0, 16384.0);
     (rays.ceil() as u32, noise * (GATHERS as f64).sqrt())
 }
 

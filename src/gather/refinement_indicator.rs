@@ -3,19 +3,19 @@
 //! An element that is not split is predicted to be off by e, root mean square over its area and
 //! relative to the radiosity of its darkest corner, or to the floor where that is more: what is
 //! between a bright corner and a dark one may be as dark as the latter. Its share of the squared
-//! error of the whole is e² times its area, and least elements are needed where all those not split
-//! have about the same share (Dörfler 1996 marks by that sum).
+//! error of the whole is e² times its area, and the number of elements is minimal if all that are
+//! not split have about the same share (Dörfler 1996 marks by that sum).
 //!
-//! | what is known of the element | e |
+//! | element | e |
 //! |---|---|
 //! | a parent of smooth light, of surplus s | s/8: a child's own is s/4, and e is half of that |
 //! | a parent with a jump | 0.2 of the largest difference of corners |
 //! | no parent | 1/8 of that, or how far the light before is from linear |
 //!
 //! Differences count as far as they are more than the noise of what they are between.
-//! Elements far from the region of the light count as if they were as much smaller as elements grow
-//! there. Nothing is known of the middle of an element whose corners are all buried, under houses
-//! that stand on a ground, say: if there was light before, it is split.
+//! Elements far from the region of the light count as if they were smaller, by the factor that
+//! elements grow by there. Elements with buried corners only, such as those under houses that stand
+//! on a ground, are split if there was light before.
 
 use arrayvec::ArrayVec;
 use glam::DVec2;
@@ -30,15 +30,14 @@ use crate::mesh::{Mesh, NodeId};
 use crate::scene::{Aabb, Rgb};
 
 /// Steps along an element's side of the lattice at which the source light is compared with its
-/// linear interpolant. Chosen by hand; no measurement kept.
+/// linear interpolant.
 const SOURCE_SAMPLES: u32 = 4;
 
-/// Places of that lattice.
-const LATTICE_PLACES: usize = ((SOURCE_SAMPLES + 1) * (SOURCE_SAMPLES + 2) / 2) as usize;
+/// Points of that lattice.
+const LATTICE_POINTS: usize = ((SOURCE_SAMPLES + 1) * (SOURCE_SAMPLES + 2) / 2) as usize;
 
 /// Root mean square of a quadratic's distance from its linear interpolant over the largest surplus
-/// of its midsides. For 4 λ_i λ_j alone it is 0.42 (one curved side), for two equal surpluses 0.71.
-/// Chosen by hand; no measurement kept.
+/// of its midsides: 0.42 for 4 λ_i λ_j alone (one curved side), 0.71 for two equal surpluses.
 const RMS_OVER_SURPLUS: f64 = 0.5;
 
 /// Where the light jumps by 1 across an element, from one corner to the two others, the linear
@@ -46,26 +45,14 @@ const RMS_OVER_SURPLUS: f64 = 0.5;
 /// the half that is left were off by 0.25 and 0.24 for jumps half-way.
 pub(crate) const RMS_OVER_JUMP: f64 = 0.2;
 
-/// Where nothing was gathered between the ends of a side, its surplus is taken for this share of
-/// their difference: half of the largest that a monotone function can have. Chosen by hand; no
-/// measurement kept.
+/// Surplus of a side between whose ends nothing was gathered, over their difference: half of the
+/// maximum of a monotone function.
 const END_DIFFERENCE_SHARE: f64 = 0.25;
 
-/// Squared error of an element that has to be split because nothing is known of its middle.
+/// Squared error of an element that has to be split because its vertices do not predict it.
 pub(super) const UNKNOWN: f64 = f64::INFINITY;
 
-/// Elements that are this many of the shortest edges long are not split, whatever they may be off
-/// by: it is far less than what others leave. Chosen by hand.
-const FINEST: f64 = 0.125;
-
-/// Growth of elements up to which they count as near the light: within its diagonal.
-const NEAR_GROWTH: f64 = 2.0;
-
-/// Elements of the first mesh that are longer than this many of the shortest edges are split once,
-/// whatever their corners say: a beam of light may fall between them.
-const SCOUTED_SIZE: f64 = 4.0;
-
-/// What errors are relative to, found once at the start of a gather.
+/// Scales of errors and lengths in a gather.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
@@ -74,7 +61,7 @@ pub(crate) struct ErrorScale {
     pub diagonal: f64,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
-    /// Where most of the light is: elements grow with the distance from it.
+    /// The region of the light: elements grow with the distance from it.
     region: Option<Aabb>,
 }
 
@@ -96,14 +83,14 @@ impl ErrorScale {
         }
     }
 
-    /// Distance up to which surfaces touch: what is between them, nobody sees; scene unit.
+    /// Distance up to which surfaces touch, scene unit.
     pub fn touching(&self) -> f64 {
         hidden::NEAR * self.diagonal
     }
 
-    /// Whether `node` of `mesh` is far from the light.
+    /// Whether `node` of `mesh` is further from the light than its diagonal.
     pub fn is_far(&self, mesh: &Mesh, node: NodeId) -> bool {
-        self.growth(mesh, node) > NEAR_GROWTH
+        self.growth(mesh, node) > 2.0
     }
 
     /// By how much larger elements are where `node` of `mesh` is.
@@ -141,7 +128,9 @@ fn relative_size(
     mesh.longest_edge(node) / scale.growth(mesh, node) / settings.group_scale(mesh.group(node))
 }
 
-/// Whether element `e` is too small to be split, whatever it may be off by.
+/// Whether element `e` is too small to be split whatever its error: an eighth of the shortest edge,
+/// whose error is far below that of others. Far from the light, where shadows are not sharp, the
+/// shortest edge.
 pub(super) fn is_finest(
     samples: &SampledMesh,
     scale: &ErrorScale,
@@ -149,90 +138,109 @@ pub(super) fn is_finest(
     e: usize,
 ) -> bool {
     let node = samples.mesh.element(e);
-    // What is far from the light has no sharp shadows.
-    let finest = if scale.is_far(&samples.mesh, node) { 1.0 } else { FINEST };
+    let finest = if scale.is_far(&samples.mesh, node) { 1.0 } else { 0.125 };
     let min_edge = settings.min_edge * settings.group_factor(samples.mesh.group(node));
     relative_size(samples, scale, settings, e) <= finest * min_edge
 }
 
-/// Squared relative error that element `e` is predicted to have, times the area that it counts
-/// with; 0 where it may not be split. `source` is the light that the vertices gathered.
+/// Squared relative error that element `e` is predicted to have, or that of the probe at its
+/// centroid if that is larger, times the area that it counts with; 0 where it may not be split.
+/// `source` is the light that the vertices gathered.
 pub(super) fn squared_error(
     samples: &SampledMesh,
     source: &RadiosityField,
     scale: &ErrorScale,
     settings: &RefinementSettings,
-    (e, found): (usize, f64),
+    e: usize,
+    probed: f64,
 ) -> f64 {
-    let node = samples.mesh.element(e);
-    if !samples.is_splittable(e) {
+    if !samples.is_splittable(e) || is_finest(samples, scale, settings, e) {
         return 0.0;
     }
-    if is_finest(samples, scale, settings, e) {
-        return 0.0;
-    }
-    let size = relative_size(samples, scale, settings, e);
-    let group_factor = settings.group_factor(samples.mesh.group(node));
-    let emitted = samples.mesh.material(node).exitance;
+    let group_factor = settings.group_factor(samples.mesh.group(samples.mesh.element(e)));
     let weight = counted_area(samples, scale, settings, e) / (group_factor * group_factor);
-    let open = samples.corners()[e].into_iter().map(|v| v as usize);
-    let darkest = open
-        .filter(|&v| !samples.buried[v])
-        .map(|v| (samples.reflected[v] + emitted).length())
-        .fold(f64::INFINITY, f64::min);
-    // Difference of two values of reflected radiosity, relative to the first or that of the darkest
-    // corner.
-    let error = |value: Rgb, other: Rgb, noise: f64| {
-        let radiosity = (value + emitted).length().min(darkest).max(scale.radiosity_floor);
-        let difference = beyond_noise((value - other).length(), noise);
-        if radiosity > 0.0 { difference / radiosity } else { 0.0 }
-    };
+    // A beam of light may fall between the corners of larger elements.
+    let is_small =
+        relative_size(samples, scale, settings, e) <= 4.0 * settings.min_edge * group_factor;
+    let rms = predicted_rms(samples, source, scale.radiosity_floor, e, is_small);
+    rms.map_or(UNKNOWN, |rms| weight * rms.max(probed).powi(2))
+}
+
+/// Relative error that element `e` is predicted to have, root mean square; none where its vertices
+/// do not say, if it is not `is_small`. Radiosities below `floor` (W/m²) count as that.
+fn predicted_rms(
+    samples: &SampledMesh,
+    source: &RadiosityField,
+    floor: f64,
+    e: usize,
+    is_small: bool,
+) -> Option<f64> {
+    let mesh = &samples.mesh;
     let corners = samples.corners()[e].map(|v| NodeValue::of(samples, v));
     let sides = [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]);
-    let largest_difference = |sides: &mut dyn Iterator<Item = [NodeValue; 2]>| {
+    // The middle may be in the open where the corners are covered.
+    if !is_small && corners.iter().all(|c| c.buried) && brightest(mesh, source, e) > floor {
+        return None;
+    }
+    let relative = RelativeError::new(&corners, mesh.material(mesh.element(e)).exitance, floor);
+    let of_ends = RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE;
+    let Some(parent) = HierarchicalSurplus::of_parent(samples, e) else {
+        if !is_small {
+            return None;
+        }
+        let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
+        // A vector over the channels as long as the root mean square.
+        let rms = Rgb::splat(source_nonlinearity(mesh, source, e) / 3f64.sqrt());
+        let gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
+        let ends = of_ends * relative.largest(gathered);
+        return Some(ends.max(relative.error(mean, mean + rms, 0.0)));
+    };
+    let own = if parent.may_jump(floor) {
+        let gathered = sides.into_iter().filter(|[a, b]| !a.buried && !b.buried);
+        RMS_OVER_JUMP * relative.largest(gathered)
+    } else {
+        let of_midside = |m: MidsideSurplus| relative.error(m.value, m.value - m.surplus, m.noise);
+        let largest = parent.sampled_midsides().map(of_midside).fold(0.0, f64::max);
+        RMS_OVER_SURPLUS * CHILD_SURPLUS * largest
+    };
+    // A buried corner has an extrapolated value, which should be about that of its element.
+    let extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
+    Some(own.max(of_ends * relative.largest(extrapolated)))
+}
+
+/// Differences of reflected radiosity in an element, relative to its radiosity.
+struct RelativeError {
+    /// Exitance of the element, W/m².
+    emitted: Rgb,
+    /// Radiosity of its darkest corner that is not buried, W/m²; infinite without any.
+    darkest: f64,
+    /// W/m².
+    floor: f64,
+}
+
+impl RelativeError {
+    fn new(corners: &[NodeValue; 3], emitted: Rgb, floor: f64) -> RelativeError {
+        let open = corners.iter().filter(|corner| !corner.buried);
+        let darkest = open.map(|c| (c.value + emitted).length()).fold(f64::INFINITY, f64::min);
+        RelativeError { emitted, darkest, floor }
+    }
+
+    /// Of `other` from `value`, beyond their `noise`: relative to the darker of `value` and the
+    /// darkest corner.
+    fn error(&self, value: Rgb, other: Rgb, noise: f64) -> f64 {
+        let radiosity = (value + self.emitted).length().min(self.darkest).max(self.floor);
+        let difference = beyond_noise((value - other).length(), noise);
+        if radiosity > 0.0 { difference / radiosity } else { 0.0 }
+    }
+
+    /// The largest between the ends of `sides`; 0 without any.
+    fn largest(&self, sides: impl Iterator<Item = [NodeValue; 2]>) -> f64 {
         let either = |[a, b]: [NodeValue; 2]| {
             let noise = a.noise.hypot(b.noise);
-            error(a.value, b.value, noise).max(error(b.value, a.value, noise))
+            self.error(a.value, b.value, noise).max(self.error(b.value, a.value, noise))
         };
         sides.map(either).fold(0.0, f64::max)
-    };
-    let is_scouted = size <= SCOUTED_SIZE * settings.min_edge * group_factor;
-    let rms = match HierarchicalSurplus::of_parent(samples, e) {
-        // What stands on the corners may leave the middle in the open.
-        _ if !is_scouted
-            && corners.iter().all(|c| c.buried)
-            && brightest(&samples.mesh, source, e) > scale.radiosity_floor =>
-        {
-            return UNKNOWN;
-        }
-        Some(parent) => {
-            // A buried corner has an extrapolated value, which should be about that of its element.
-            let mut extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
-            let extrapolated =
-                RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE * largest_difference(&mut extrapolated);
-            let own = if parent.may_jump(scale.radiosity_floor) {
-                let mut gathered = sides.into_iter().filter(|[a, b]| !a.buried && !b.buried);
-                RMS_OVER_JUMP * largest_difference(&mut gathered)
-            } else {
-                let surplus = parent.sampled_midsides();
-                let of_midside = |m: MidsideSurplus| error(m.value, m.value - m.surplus, m.noise);
-                let largest = surplus.map(of_midside).fold(0.0, f64::max);
-                RMS_OVER_SURPLUS * CHILD_SURPLUS * largest
-            };
-            own.max(extrapolated)
-        }
-        // Corners far apart say little of what lies between them.
-        None if !is_scouted => return UNKNOWN,
-        None => {
-            let mean = corners.iter().map(|c| c.value).sum::<Rgb>() / 3.0;
-            // A vector over the channels as long as the root mean square.
-            let rms = Rgb::splat(source_nonlinearity(&samples.mesh, source, e) / 3f64.sqrt());
-            let mut gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
-            let ends = RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE * largest_difference(&mut gathered);
-            ends.max(error(mean, mean + rms, 0.0))
-        }
-    };
-    weight * rms.max(found).powi(2)
+    }
 }
 
 /// Whether any of the values that the error of element `e` is predicted by is that of a buried
@@ -246,7 +254,7 @@ pub(super) fn has_buried_node(samples: &SampledMesh, e: usize) -> bool {
 /// How far `source` is from linear over element `e` of `mesh`: root mean square over a lattice,
 /// W/m², a length over the channels.
 pub(super) fn source_nonlinearity(mesh: &Mesh, source: &RadiosityField, e: usize) -> f64 {
-    let values: ArrayVec<([f64; 3], Rgb), LATTICE_PLACES> =
+    let values: ArrayVec<([f64; 3], Rgb), LATTICE_POINTS> =
         source_lattice(mesh, source, e).collect();
     let end = |k: usize| values.iter().find(|(at, _)| at[k] == 1.0).map_or(Rgb::ZERO, |(_, b)| *b);
     let ends = [0, 1, 2].map(end);
@@ -256,14 +264,14 @@ pub(super) fn source_nonlinearity(mesh: &Mesh, source: &RadiosityField, e: usize
     (values.iter().map(square).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// The brightest that `source` is over a lattice on element `e` of `mesh`, W/m²: a length over the
+/// Maximum of `source` over a lattice on element `e` of `mesh`, W/m²: a length over the
 /// channels.
 fn brightest(mesh: &Mesh, source: &RadiosityField, e: usize) -> f64 {
     source_lattice(mesh, source, e).map(|(_, value)| value.length()).fold(0.0, f64::max)
 }
 
-/// What `source` reflects, W/m², at the places of a lattice on element `e` of `mesh`, by their
-/// barycentric weights.
+/// Barycentric weights of the points of a lattice on element `e` of `mesh`, each with what `source`
+/// reflects there, W/m².
 fn source_lattice(
     mesh: &Mesh,
     source: &RadiosityField,
@@ -273,8 +281,8 @@ fn source_lattice(
     let t = mesh.triangle(node);
     let [a, b, c] = mesh.cell(node).corners().map(DVec2::from_array);
     let steps = |i: u32| (0..=SOURCE_SAMPLES - i).map(move |j| [i, j, SOURCE_SAMPLES - i - j]);
-    (0..=SOURCE_SAMPLES).flat_map(steps).map(move |place| {
-        let [u, v, w] = place.map(|k| f64::from(k) / f64::from(SOURCE_SAMPLES));
+    (0..=SOURCE_SAMPLES).flat_map(steps).map(move |steps| {
+        let [u, v, w] = steps.map(|k| f64::from(k) / f64::from(SOURCE_SAMPLES));
         let at = a * u + b * v + c * w;
         ([u, v, w], source.untextured_at(t, at.x, at.y))
     })
@@ -313,7 +321,7 @@ mod tests {
         // The longest edge is 90.5: less than four of these, so that corners tell.
         let settings = RefinementSettings::new(32.0);
         let worst = |samples: &SampledMesh| {
-            let of = |e| squared_error(samples, &field, &scale, &settings, (e, 0.0));
+            let of = |e| squared_error(samples, &field, &scale, &settings, e, 0.0);
             (0..samples.mesh.element_count()).map(of).fold(0.0, f64::max)
         };
         // Every other vertex is a tenth darker, or so dark that light may jump; of elements without
@@ -360,7 +368,7 @@ mod tests {
         let indicator = |source: &GatheredMesh, min_edge: f64| {
             let settings = RefinementSettings::new(min_edge);
             let field = source.radiosity_field();
-            let of = |e| squared_error(&samples, &field, &scale, &settings, (e, 0.0));
+            let of = |e| squared_error(&samples, &field, &scale, &settings, e, 0.0);
             (0..samples.mesh.element_count()).map(of).fold(0.0, f64::max)
         };
         // Their longest edge is 45.3.

@@ -40,24 +40,16 @@ pub struct RefinementSettings {
 }
 
 impl RefinementSettings {
-    /// Default of [`RefinementSettings::mesh_error`]: a share of the radiosity, chosen by
-    /// hand; no measurement kept.
-    pub const DEFAULT_MESH_ERROR: f64 = 0.02;
-
-    /// Default of [`RefinementSettings::interpolation_tolerance`]: a share of the radiosity, chosen
-    /// by hand; no measurement kept.
-    pub const DEFAULT_INTERPOLATION_TOLERANCE: f64 = 0.0025;
-
-    /// Default of [`RefinementSettings::max_elements`], chosen by hand; no measurement kept.
+    /// Default of [`RefinementSettings::max_elements`].
     pub const DEFAULT_MAX_ELEMENTS: usize = 1 << 19;
 
-    /// Refines down to elements with edges of `min_edge` (scene unit), with the
-    /// default tolerances, no uniform subdivision and one pass.
+    /// Refines down to elements with edges of `min_edge` (scene unit), to an error of the mesh of 2
+    /// % and an interpolation tolerance of 0.25 %, with no uniform subdivision and one pass.
     pub fn new(min_edge: f64) -> RefinementSettings {
         RefinementSettings {
-            mesh_error: RefinementSettings::DEFAULT_MESH_ERROR,
+            mesh_error: 0.02,
             min_edge,
-            interpolation_tolerance: RefinementSettings::DEFAULT_INTERPOLATION_TOLERANCE,
+            interpolation_tolerance: 0.0025,
             max_elements: RefinementSettings::DEFAULT_MAX_ELEMENTS,
             initial_subdivisions: 0,
             gather_passes: 1,

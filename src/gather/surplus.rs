@@ -30,13 +30,8 @@ use crate::scene::Rgb;
 /// Surplus of a child's side over that of the parent's side it is parallel to, for quadratic light.
 pub(super) const CHILD_SURPLUS: f64 = 0.25;
 
-/// Where the surpluses of an element's three sides sum to more than this share of the sum of its
-/// midside values, the light has a jump (an edge of a shadow) and a quadratic says nothing. Chosen
-/// by hand; no measurement kept.
-const MAX_SMOOTH_SURPLUS: f64 = 0.2;
-
-/// Where a surplus is more than this share of the darkest of the six nodes, most of an element's
-/// error may be where the light jumps. Chosen by hand; no other was tried.
+/// Surplus over the darkest of the six nodes, above which most of an element's error may be at a
+/// jump of the light. No other value was tried.
 const MAX_CERTAIN_SURPLUS: f64 = 0.3;
 
 /// A value at a vertex.
@@ -124,11 +119,12 @@ impl HierarchicalSurplus {
     }
 
     /// Whether the quadratic interpolant describes the light: all six nodes are samples of it, and
-    /// none is at a jump.
+    /// there is no jump (an edge of a shadow), of which the sum of surpluses is at least 0.2 of the
+    /// sum of midside values.
     pub fn is_smooth(&self) -> bool {
         let surplus = self.midside_surplus().iter().sum::<Rgb>();
         let midsides = self.midsides.iter().map(|m| m.value).sum::<Rgb>();
-        self.is_sampled() && surplus.length() < MAX_SMOOTH_SURPLUS * midsides.length()
+        self.is_sampled() && surplus.length() < 0.2 * midsides.length()
     }
 
     /// Whether it may jump next to its darkest node, or to `floor` (W/m²) where this is more.

@@ -10,10 +10,6 @@ use crate::error::Error;
 use crate::scene::{Material, Rgb};
 use crate::visibility::offset;
 
-/// How far beside a point another one lies, in units of its size; up to 1.5 times as far. Small
-/// enough that the light is the same, large enough to be another cell of the rotation.
-const JITTER: f64 = 1e-3;
-
 /// A gather point, and how much counts what arrives on the other side of its surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TwoSidedPoint {
@@ -39,11 +35,11 @@ impl TwoSidedPoint {
         TwoSidedPoint { point, height, behind: Rgb::ZERO }
     }
 
-    /// A point a hair beside, towards what lies `inward`: the light is the same there, but another
-    /// `turn` of the directions, in [0, 1), goes with another step. `size` is that of what the
-    /// point stands for, scene unit.
+    /// A point beside, `inward`, by 0.5e-3 to 1.5e-3 of `size` (scene unit), that of the element:
+    /// the light is the same there, and the rotation of the directions another. The step depends on
+    /// `turn`, in [0, 1).
     pub fn beside(self, inward: DVec3, size: f64, turn: f64) -> TwoSidedPoint {
-        let step = (JITTER * size * (0.5 + turn)).min(inward.length());
+        let step = (1e-3 * size * (0.5 + turn)).min(inward.length());
         self.moved_by(inward.normalize_or_zero() * step)
     }
 

@@ -15,10 +15,6 @@ use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::vertex::keys::Vertices;
 
-/// Vertices in the first batch; later ones follow the clock. Chosen by hand: results do not depend
-/// on it.
-const FIRST_BATCH: usize = 256;
-
 /// What a vertex sees, by parts of the rays.
 pub(crate) struct VertexRow {
     /// From the side that the vertex is on.
@@ -63,8 +59,8 @@ impl<'a> VertexRows<'a> {
         self.points.point(v, 0).shares()
     }
 
-    /// What `work` makes of the row of each of `vertices`, in their order, made by so many `parts`
-    /// of the rays; none where `progress` broke, which is told of each batch that is done.
+    /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
+    /// rays; none if `progress`, called after each batch with the number done, breaks.
     pub fn map<T: Send>(
         &self,
         vertices: &[u32],
@@ -73,7 +69,7 @@ impl<'a> VertexRows<'a> {
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Option<Vec<T>> {
         let mut results = Vec::with_capacity(vertices.len());
-        let mut batches = BatchSizer::new(FIRST_BATCH);
+        let mut batches = BatchSizer::new(256);
         let mut remaining = vertices;
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {

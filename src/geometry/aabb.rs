@@ -55,6 +55,12 @@ impl Aabb {
         (total > 0.0 && low != high).then_some(Aabb { low, high })
     }
 
+    /// The box around the weights of `points`, less 1 % at either end of each axis, if its diagonal
+    /// is less than a quarter of `diagonal`: in an ordinary room the light fills the room.
+    pub fn concentrated(points: &[(DVec3, f64)], diagonal: f64) -> Option<Aabb> {
+        Aabb::around_most(points, 0.01).filter(|most| most.diagonal() * 4.0 < diagonal)
+    }
+
     /// The smallest box around `points`; [`Aabb::EMPTY`] around none.
     pub fn from_points(points: impl IntoIterator<Item = DVec3>) -> Aabb {
         let mut bounds = Aabb::EMPTY;

@@ -1,15 +1,14 @@
-//! Which light a path asks next: emitting triangles in clusters, chosen by how bright they may be
-//! at a point.
+//! Choice of an emitting triangle for a path: in clusters, by an approximate irradiance at a point.
 //!
 //! ```text
 //! x ──► weight of each cluster: E · min(1, A / (π d²))     d: from x to the cluster's box
 //!   ──► a cluster, in proportion ──► a triangle of it, by its power ──► a point, by area
 //! ```
 //!
-//! The weight bounds nothing and need not be good: it only steers. What counts is that the density
-//! of every choice can be told again, for the light that a path meets by itself.
+//! The weight affects variance only. The density of every choice can be evaluated again, for the
+//! light that a path hits without it (multiple importance sampling).
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -17,15 +16,8 @@ use glam::DVec3;
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// Clusters there are at most: the weights of all are taken at every vertex of every path.
+/// Maximum number of clusters: every vertex of every path evaluates the weights of all.
 const MAX_CLUSTERS: usize = 64;
-
-/// Widths that agree to this share are equal: a scene in another unit has the same clusters.
-const EQUAL: f64 = 1.0 - 1e-9;
-
-/// Triangles are sorted by where they lie in units of this share of their box. It is no fraction of
-/// small numbers, so that regular places do not lie on its steps, which rounding would move.
-const SORT_STEP: f64 = 1e-6 / std::f64::consts::SQRT_2;
 
 /// The emitting triangles of a scene.
 #[derive(Debug)]
@@ -134,13 +126,14 @@ fn split(scene: &Scene, all: Vec<usize>) -> Vec<Vec<usize>> {
     let mut clusters = vec![(width(&all), all)];
     while clusters.len() < MAX_CLUSTERS {
         let widest = clusters.iter().map(|&(width, _)| width).fold(0.0, f64::max);
-        let Some(widest) = clusters.iter().rposition(|c| c.1.len() > 1 && c.0 >= EQUAL * widest)
-        else {
-            break;
-        };
+        // Equal up to rounding: a scene in another unit has the same clusters.
+        let is_widest = |c: &(f64, Vec<usize>)| c.1.len() > 1 && c.0 >= (1.0 - 1e-9) * widest;
+        let Some(widest) = clusters.iter().rposition(is_widest) else { break };
         let (_, mut low) = clusters.swap_remove(widest);
         let bounds = bounds_of(scene, &low);
-        let (axis, step) = (bounds.longest_axis(), SORT_STEP * bounds.longest_side());
+        // An irrational step: regular positions, which rounding moves, do not lie on multiples of
+        // it.
+        let (axis, step) = (bounds.longest_axis(), 1e-6 / SQRT_2 * bounds.longest_side());
         let along = |t: usize| ((centre(t) - bounds.low)[axis] / step) as u64;
         low.sort_by_key(|&t| (along(t), t));
         let high = low.split_off(low.len() / 2);

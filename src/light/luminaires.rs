@@ -1,4 +1,5 @@
-//! Which luminaire a path asks: the more irradiance its middle may bring, the more often.
+//! Choice of a luminaire for a path: in proportion to the irradiance from its middle, unoccluded,
+//! and to at least 1 % of that by its mean intensity at normal incidence.
 
 use std::f64::consts::PI;
 
@@ -6,10 +7,6 @@ use fastrand::Rng;
 use glam::DVec3;
 
 use crate::scene::Luminaire;
-
-/// Share of its mean intensity that every luminaire counts with at least, straight ahead: the
-/// middle of one may be dark or behind the surface, and its rim not.
-const MIN_SHARE: f64 = 0.01;
 
 /// One of `luminaires` for a point with unit `normal`, and the probability of that choice; none
 /// without light.
@@ -21,7 +18,8 @@ pub(super) fn choose<'a>(
 ) -> Option<(&'a Luminaire, f64)> {
     let weight = |luminaire: &Luminaire| {
         let far = luminaire.position.distance_squared(at).max(luminaire.extent().powi(2));
-        let least = MIN_SHARE * luminaire.intensity.flux() / (4.0 * PI) / far;
+        // The middle may be dark or behind the surface, and its rim not.
+        let least = 0.01 * luminaire.intensity.flux() / (4.0 * PI) / far;
         let middle = luminaire.irradiance(luminaire.position, at, normal);
         luminaire.scale.element_sum() * middle.max(least)
     };

@@ -33,22 +33,9 @@ use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// Paths go on with this probability at most. What reflects more ends as often and counts the more:
-/// still unbiased, and a room that reflects all but nothing does not keep a path for ever.
+/// Maximum probability that a path continues: paths end in a room of albedo 1, too, and the weights
+/// keep the result unbiased.
 const MAX_SURVIVAL: f64 = 0.999;
-
-/// Points further off a surface than this share of the scene's diagonal are not on it. Points from
-/// files have 32 bits or six digits; of several surfaces within it the nearest counts.
-const LOOKUP_REACH: f64 = 1e-4;
-
-/// Surfaces whose distances from a point differ by less than this share of that are in one place.
-const IN_ONE_PLACE: f64 = 0.01;
-
-/// Points of a triangle at which one is looked for that is in no hole. Chosen by hand.
-const MAX_TRIES: usize = 1000;
-
-/// Surfaces whose normals agree by this cosine face alike.
-const ALIKE: f64 = 0.8;
 
 /// A scene, owned or not.
 #[derive(Debug)]
@@ -431,8 +418,8 @@ impl<'a> PathTracer<'a> {
 }
 
 /// The hits nearest to `position` along the line of `normal` (unit length), before and behind, of
-/// triangles that face alike by their `normals`, within [`LOOKUP_REACH`] of `diagonal`: those that
-/// lie in one place, the nearest first.
+/// triangles with `normals` within 37° of it, the nearest first: up to 1e-4 of `diagonal`, since
+/// points of files have 32 bits or six digits, and up to a hundredth of that behind the first.
 pub(crate) fn nearest_surfaces(
     rays: &RayScene,
     normals: &[DVec3],
@@ -440,11 +427,11 @@ pub(crate) fn nearest_surfaces(
     normal: DVec3,
     diagonal: f64,
 ) -> Vec<Hit> {
-    let reach = LOOKUP_REACH * diagonal;
+    let reach = 1e-4 * diagonal;
     let found = RefCell::new(vec![]);
     // From before it: what lies in one place with another, back to back, is met on its front only.
     rays.occluded(position + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
-        if normals[hit.triangle].dot(normal) > ALIKE {
+        if normals[hit.triangle].dot(normal) > 0.8 {
             found.borrow_mut().push(*hit);
         }
         false
@@ -452,7 +439,7 @@ pub(crate) fn nearest_surfaces(
     let off = |hit: &Hit| (hit.distance - reach).abs();
     let mut found = found.into_inner();
     let nearest = found.iter().map(off).fold(f64::INFINITY, f64::min);
-    found.retain(|hit| off(hit) <= nearest + IN_ONE_PLACE * reach);
+    found.retain(|hit| off(hit) <= nearest + 0.01 * reach);
     let key = |hit: &Hit| (off(hit), hit.triangle);
     found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
     found.dedup_by_key(|hit| hit.triangle);
@@ -464,7 +451,7 @@ pub(crate) fn nearest_surfaces(
 pub(crate) fn random_point(scene: &Scene, t: usize, part: &Part, rng: &mut Rng) -> DVec3 {
     let mut random_place = || part.place(random_barycentric(rng));
     let place = random_place();
-    let others = std::iter::repeat_with(random_place).take(MAX_TRIES);
+    let others = std::iter::repeat_with(random_place).take(1000);
     let solid = scene.first_solid(t, std::iter::once(place).chain(others));
     point_at(scene.corners(t), solid.unwrap_or(place))
 }

@@ -1,4 +1,4 @@
-//! Random points of groups, what paths find there, and what a solution tells.
+//! Random points of groups, with the radiosity by paths and that of a solution.
 
 use std::ops::ControlFlow;
 
@@ -19,19 +19,6 @@ use crate::progress::BatchSizer;
 use crate::sampling::random::random_numbers;
 use crate::scene::{Aabb, Rgb, Scene};
 
-/// A solution is of another scene if more than this share of the points lie on none of its faces.
-const MISSING_SHARE: f64 = 0.01;
-
-/// Rays by which a point finds what it sees.
-const OUTLOOK_RAYS: usize = 128;
-
-/// Share of the light that may lie outside of the box where the light is, at either end of an axis.
-const TRIMMED_SHARE: f64 = 0.01;
-
-/// The box has to be this many times smaller than the one around all that reflects: in an ordinary
-/// room the light fills the room.
-const MIN_CONCENTRATION: f64 = 4.0;
-
 /// Points of groups, and what was traced at them so far.
 #[derive(Debug)]
 pub(super) struct Sampler<'a> {
@@ -50,7 +37,7 @@ struct Stratum {
     points: Vec<TracedPoint>,
     /// Sum of the weights of the points.
     weight: f64,
-    /// Points that it has at least.
+    /// Minimum number of points.
     least: usize,
 }
 
@@ -62,13 +49,14 @@ struct TracedPoint {
     point: SurfacePoint,
     /// Area that it stands for, over that of points spread evenly over the group.
     weight: f64,
-    /// What the solution tells, W/m²; none before it is asked, and where it has no face.
-    told: Option<Rgb>,
-    /// What it sees; known with the first paths, and with it whether it is hidden.
+    /// Reflected radiosity of the solution, W/m²; none before it is looked up, and where the
+    /// solution has no face.
+    solution: Option<Rgb>,
+    /// Known with the first paths, as is whether the point is hidden.
     outlook: Outlook,
     hidden: bool,
     paths: usize,
-    /// What the paths found, part by part: sums, W/m².
+    /// Sums over the paths of each part, W/m².
     sums: [Rgb; PARTS],
 }
 
@@ -95,7 +83,7 @@ impl<'a> Sampler<'a> {
         let counting = |s: &Stratum| s.surface.share * (1.0 - s.hidden_share());
         let whole: f64 = self.strata.iter().map(counting).sum();
         for stratum in &mut self.strata {
-            // Where all is hidden, as far as is known, all is looked at.
+            // Where all points are hidden so far, all area has points.
             let share = match whole > 0.0 {
                 true => counting(stratum) / whole,
                 false => stratum.surface.share,
@@ -111,7 +99,7 @@ impl<'a> Sampler<'a> {
                     index,
                     point,
                     weight,
-                    told: None,
+                    solution: None,
                     outlook: Outlook::default(),
                     hidden: false,
                     paths: 0,
@@ -135,26 +123,27 @@ impl<'a> Sampler<'a> {
         more
     }
 
-    /// Forgets what a solution told.
+    /// Removes the radiosity of a solution from all points.
     pub fn forget(&mut self) {
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
-            point.told = None;
+            point.solution = None;
         }
     }
 
-    /// Asks `solution` at all points that know nothing of it.
+    /// Looks up `solution` at all points that lack it.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] where too many points lie on none of its faces.
-    pub fn tell(&mut self, solution: &dyn Solution) -> Result<(), Error> {
+    pub fn look_up(&mut self, solution: &dyn Solution) -> Result<(), Error> {
         let scene = self.scene;
         let points = self.strata.iter_mut().flat_map(|stratum| &mut stratum.points);
-        let unknown: Vec<&mut TracedPoint> = points.filter(|p| p.told.is_none()).collect();
-        unknown.into_par_iter().for_each(|p| p.told = solution.reflected(scene, &p.point));
+        let unknown: Vec<&mut TracedPoint> = points.filter(|p| p.solution.is_none()).collect();
+        unknown.into_par_iter().for_each(|p| p.solution = solution.reflected(scene, &p.point));
         let (drawn, missing) = (self.drawn(), self.missing());
-        let mut lost = self.traced().filter(|(_, point)| point.told.is_none());
+        let mut lost = self.traced().filter(|(_, point)| point.solution.is_none());
         match lost.next() {
-            Some((group, lost)) if missing as f64 > MISSING_SHARE * drawn as f64 => {
+            // Of another scene.
+            Some((group, lost)) if missing as f64 > 0.01 * drawn as f64 => {
                 let (group, at) = (quoted(&scene.groups()[group..=group]), lost.point.position);
                 let found = format!(
                     "{missing} of {drawn} random points of the scene lie on none of its faces, \
@@ -173,7 +162,7 @@ impl<'a> Sampler<'a> {
     }
 
     fn missing(&self) -> usize {
-        self.traced().filter(|(_, point)| point.told.is_none()).count()
+        self.traced().filter(|(_, point)| point.solution.is_none()).count()
     }
 
     /// Traces until every point has `paths`. Stopped, it changes nothing.
@@ -204,7 +193,7 @@ impl<'a> Sampler<'a> {
         self.paths = paths;
         let diagonal = self.lit_diagonal();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
-            let dark = point.sample().found() == Rgb::ZERO && point.paths >= PATHS_IN_THE_DARK;
+            let dark = point.sample().measured() == Rgb::ZERO && point.paths >= PATHS_IN_THE_DARK;
             point.hidden = Outlook { dark, ..point.outlook }.is_hidden(diagonal);
         }
         ControlFlow::Continue(())
@@ -214,14 +203,12 @@ impl<'a> Sampler<'a> {
     /// beside the wide plane that the room stands on; scene unit.
     fn lit_diagonal(&self) -> f64 {
         let points = self.strata.iter().flat_map(|s| {
-            let flux = |p: &TracedPoint| s.area_of(p) * p.sample().found().length();
+            let flux = |p: &TracedPoint| s.area_of(p) * p.sample().measured().length();
             s.points.iter().map(move |p| (p.point.position, flux(p)))
         });
         let whole = self.scene.reflecting_bounds().diagonal();
-        match Aabb::around_most(&points.collect::<Vec<_>>(), TRIMMED_SHARE) {
-            Some(lit) if lit.diagonal() * MIN_CONCENTRATION < whole => lit.diagonal(),
-            _ => whole,
-        }
+        let lit = Aabb::concentrated(&points.collect::<Vec<_>>(), whole);
+        lit.map_or(whole, |lit| lit.diagonal())
     }
 
     /// All points, with the groups that they are of.
@@ -251,7 +238,7 @@ impl<'a> Sampler<'a> {
         for s in &self.strata {
             let counting = s.points.iter().filter(|p| hidden || !p.hidden);
             for point in counting {
-                sum += s.area_of(point) * point.sample().found().length();
+                sum += s.area_of(point) * point.sample().measured().length();
                 share += s.area_of(point);
             }
         }
@@ -262,7 +249,7 @@ impl<'a> Sampler<'a> {
     fn counting(&self, hidden: bool) -> Vec<Vec<MeasuredPoint>> {
         let floor = self.settings.measure.floor * self.mean_reflected(hidden);
         let of_group = |(stratum, s): (usize, &Stratum)| {
-            let counts = |p: &&TracedPoint| p.told.is_some() && (hidden || !p.hidden);
+            let counts = |p: &&TracedPoint| p.solution.is_some() && (hidden || !p.hidden);
             let measured = |p: &TracedPoint| {
                 let error = p.sample().square_error(floor);
                 MeasuredPoint { stratum, area: s.area_of(p), error }
@@ -283,7 +270,7 @@ impl<'a> Sampler<'a> {
         TrimmedSquare::new(&counting.concat(), self.settings.measure.tail).unwrap_or_default()
     }
 
-    /// What is known so far, and the mean square error that is its error.
+    /// The result so far, and the mean square error of the whole.
     pub fn verification(&self) -> (Verification, MeanSquare) {
         let hidden = self.settings.hidden;
         let mean_reflected = self.mean_reflected(hidden);
@@ -312,15 +299,15 @@ impl<'a> Sampler<'a> {
                 bias: error.map_or(0.0, |error| error.bias),
             });
             for traced in &s.points {
-                let Some(told) = traced.told else { continue };
+                let Some(solution) = traced.solution else { continue };
                 let sample = traced.sample();
                 let counts = !counting.is_empty() && (hidden || !traced.hidden);
                 points.push(PointError {
                     position: traced.point.position,
                     normal: self.scene.normal(traced.point.triangle),
                     group: s.surface.group,
-                    told,
-                    found: sample.found(),
+                    solution,
+                    measured: sample.measured(),
                     standard_error: sample.variance().sqrt(),
                     error: sample.square_error(floor).value.max(0.0).sqrt(),
                     tail: if counts { tails.next().unwrap_or(0.0) } else { 0.0 },
@@ -328,7 +315,7 @@ impl<'a> Sampler<'a> {
                 });
             }
         }
-        let is_told = self.paths > 0 && self.missing() < self.drawn();
+        let is_known = self.paths > 0 && self.missing() < self.drawn();
         let hidden_share: f64 =
             self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum();
         let with_hidden = match hidden || hidden_share == 0.0 {
@@ -340,11 +327,11 @@ impl<'a> Sampler<'a> {
             _ => TrimmedSquare::new(&counting.concat(), 0.0).unwrap_or_default().mean,
         };
         let verification = Verification {
-            error: is_told.then(|| all.mean.root()),
-            tail: is_told.then(|| all.tail.max(0.0).sqrt()),
+            error: is_known.then(|| all.mean.root()),
+            tail: is_known.then(|| all.tail.max(0.0).sqrt()),
             bias: all.mean.bias,
-            error_with_tail: is_told.then(|| plain.root()),
-            error_with_hidden: is_told.then(|| with_hidden.root()),
+            error_with_tail: is_known.then(|| plain.root()),
+            error_with_hidden: is_known.then(|| with_hidden.root()),
             hidden_share,
             groups,
             points,
@@ -359,8 +346,9 @@ impl<'a> Sampler<'a> {
 
 /// What `point` sees, by rays.
 fn outlook(tracer: &PathTracer, point: &SurfacePoint, rng: &mut Rng) -> Outlook {
-    let hits = tracer.hits(point, OUTLOOK_RAYS, rng);
-    let share = 1.0 / OUTLOOK_RAYS as f64;
+    let rays = 128;
+    let hits = tracer.hits(point, rays, rng);
+    let share = 1.0 / rays as f64;
     Outlook {
         covered: share * hits.len() as f64,
         backs: share * hits.iter().filter(|hit| !hit.front).count() as f64,
@@ -385,6 +373,9 @@ impl Stratum {
 impl TracedPoint {
     fn sample(&self) -> Sample {
         let paths = (self.paths / PARTS).max(1) as f64;
-        Sample { told: self.told.unwrap_or(Rgb::ZERO), parts: self.sums.map(|sum| sum / paths) }
+        Sample {
+            solution: self.solution.unwrap_or(Rgb::ZERO),
+            parts: self.sums.map(|sum| sum / paths),
+        }
     }
 }

@@ -1,11 +1,11 @@
-//! How well, and how long, a verification looks.
+//! Settings of a verification.
 
 use std::time::Duration;
 
 use crate::accuracy::Measure;
 use crate::error::{Error, ErrorKind};
 
-/// How well, and how long, to look.
+/// Settings of a verification.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Settings {

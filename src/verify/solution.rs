@@ -1,4 +1,4 @@
-//! What a solution says of a point: its face there, interpolated.
+//! Radiosity of a solution at points: interpolated over its face there.
 
 use std::f64::consts::PI;
 
@@ -10,61 +10,52 @@ use crate::scene::{Material, Rgb, Scene};
 use crate::vertex::{FacePlace, VertexMesh};
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// Places of a material at which it is looked up what the solution emits, at least. Chosen by hand.
-const EMISSION_PLACES: usize = 64;
-
-/// Where on the way from the centre of a triangle to its corners they are.
-const TO_CORNER: f64 = 0.5;
-
-/// Share of the radiosity below which emission is noise: files have six digits, and vertices at
-/// the edge of light may be smoothed. Chosen by hand.
-const EMISSION_NOISE: f64 = 1e-3;
-
-/// What the solution emits on the triangles of a material.
+/// Exitance of the solution on the triangles of a material.
 #[derive(Clone, Copy, Default)]
 struct Emission {
-    places: usize,
-    /// Whether it is what the material emits, at any of the places.
+    points: usize,
+    /// Whether it is that of the material at any of the points.
     agrees: bool,
-    /// What was found at the last of them, W/m².
-    told: Rgb,
+    /// At the last of them, W/m².
+    exitance: Rgb,
 }
 
-/// The error that a solution has other light than a scene's `material`: it was found to emit
-/// `told`, W/m².
-fn other_emission(material: &Material, told: Rgb) -> Error {
-    // Four digits: what the vertices of a file tell is no more exact.
+/// The error that a solution emits the `exitance` (W/m²), and not that of a scene's `material`.
+fn other_emission(material: &Material, exitance: Rgb) -> Error {
+    // Four digits: the vertices of a file are no more exact.
     let digits = |x: f64| format!("{x:.3e}").parse().unwrap_or(x).to_string();
     let radiance = |exitance: Rgb| {
         let channels = exitance.max(Rgb::ZERO) / PI;
         channels.to_array().map(digits).join(",")
     };
-    let told = radiance(told);
+    let emitted = radiance(exitance);
     let name = shortened(&material.name);
     let found = format!(
-        "its material '{name}' emits radiance {told}, and {} in the scene",
+        "its material '{name}' emits radiance {emitted}, and {} in the scene",
         radiance(material.exitance)
     );
-    let remedy =
-        format!("verify it with the reflectances and lamps it had, such as --emit {name}={told}");
+    let remedy = format!(
+        "verify it with the reflectances and lamps it had, such as --emit {name}={emitted}"
+    );
     Error::new(ErrorKind::Scene, "solution", found, remedy)
 }
 
-/// Whether `material` has this radiosity under this irradiance, W/m², as exactly as they are known.
+/// Whether `material` has this radiosity under this irradiance, W/m², to 0.1 %: files have six
+/// digits, and vertices at the edge of light may be smoothed.
 fn is_light_of(material: &Material, radiosity: Rgb, irradiance: Rgb) -> bool {
     let reflected = material.albedo() * irradiance;
-    let noise = EMISSION_NOISE * radiosity.max_element().max(reflected.max_element());
+    let noise = 1e-3 * radiosity.max_element().max(reflected.max_element());
     (radiosity - reflected).abs_diff_eq(material.exitance, noise)
 }
 
-/// What tells the light of a scene's surfaces.
+/// Radiosity on the surfaces of a scene.
 pub(crate) trait Solution: Sync {
     /// Radiosity that `point` of `scene` reflects with the reflectance of its material, W/m². None
-    /// where nothing is told.
+    /// where the solution has no face.
     fn reflected(&self, scene: &Scene, point: &SurfacePoint) -> Option<Rgb>;
 
-    /// Places at which the light was found.
-    fn places(&self) -> usize;
+    /// Number of vertices.
+    fn vertices(&self) -> usize;
 }
 
 /// Any mesh of vertices as a solution: its faces are found by rays.
@@ -126,8 +117,8 @@ impl<'a> SolutionLookup<'a> {
 
     /// Refuses a solution whose surfaces emit something else than those of `scene`: what a vertex
     /// emits is its radiosity less its irradiance times the reflectance. A material is refused
-    /// where that differs at every place of its triangles that is looked at. What has a texture is
-    /// not looked at: its vertices have means.
+    /// where that differs at every point that is looked up, 64 of each material or more. What has a
+    /// texture is not looked at: its vertices have means.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] with the material and what it emits in both.
@@ -138,31 +129,31 @@ impl<'a> SolutionLookup<'a> {
         let mut of_materials = vec![Emission::default(); scene.materials().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
             let emission = &mut of_materials[triangle.material as usize];
-            if emission.agrees || emission.places >= EMISSION_PLACES || scene.textures(t).is_some()
-            {
+            if emission.agrees || emission.points >= 64 || scene.textures(t).is_some() {
                 continue;
             }
             let material = scene.material(t);
             for (radiosity, irradiance) in self.light(scene, t) {
                 emission.agrees |= is_light_of(material, radiosity, irradiance);
-                emission.places += 1;
-                emission.told = radiosity - material.albedo() * irradiance;
+                emission.points += 1;
+                emission.exitance = radiosity - material.albedo() * irradiance;
             }
         }
         for (emission, material) in of_materials.iter().zip(scene.materials()) {
-            if emission.places > 0 && !emission.agrees {
-                return Err(other_emission(material, emission.told));
+            if emission.points > 0 && !emission.agrees {
+                return Err(other_emission(material, emission.exitance));
             }
         }
         Ok(())
     }
 
-    /// Radiosity and irradiance of the solution at places of triangle `t` of `scene`, W/m².
+    /// Radiosity and irradiance of the solution at the centre of triangle `t` of `scene` and
+    /// half-way from there to its corners, W/m².
     fn light(&self, scene: &Scene, t: usize) -> impl Iterator<Item = (Rgb, Rgb)> {
         let corners = scene.corners(t);
         let centre = corners.into_iter().sum::<DVec3>() / 3.0;
-        let places = [centre].into_iter().chain(corners.map(|c| centre.lerp(c, TO_CORNER)));
-        places.filter_map(move |position| {
+        let points = [centre].into_iter().chain(corners.map(|c| centre.midpoint(c)));
+        points.filter_map(move |position| {
             let place = self.face(scene, &SurfacePoint { triangle: t, position })?;
             Some(self.light_at(&place))
         })
@@ -204,7 +195,7 @@ impl Solution for SolutionLookup<'_> {
         Some(self.solution.reflected_at(scene, point.triangle, &place))
     }
 
-    fn places(&self) -> usize {
+    fn vertices(&self) -> usize {
         self.solution.positions.len()
     }
 }

@@ -1,4 +1,4 @@
-//! What a verification tells: underway, and in the end.
+//! Results of a verification: underway, and in the end.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ pub struct Progress {
     pub done: usize,
     /// Points of this round.
     pub of: usize,
-    /// What the rounds before found, after the first.
+    /// The error by the rounds before, after the first.
     pub error: Option<Estimate>,
 }
 
@@ -94,11 +94,11 @@ pub struct PointError {
     pub normal: DVec3,
     /// Index of the group in the scene.
     pub group: usize,
-    /// Reflected radiosity that the solution tells, W/m².
-    pub told: Rgb,
-    /// Reflected radiosity that the paths found, W/m².
-    pub found: Rgb,
-    /// Length of the standard error of `found`, W/m².
+    /// Reflected radiosity of the solution, W/m².
+    pub solution: Rgb,
+    /// Reflected radiosity by the paths, W/m².
+    pub measured: Rgb,
+    /// Length of the standard error of `measured`, W/m².
     pub standard_error: f64,
     /// The error e, as a share: zero where less than noise is left.
     pub error: f64,

@@ -21,24 +21,6 @@ use crate::geometry::incidence::Incidence;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 
-/// Elements that a plane is fitted to, at least: through three it passes exactly, and swings with
-/// their noise.
-const MIN_FIT_POINTS: usize = 4;
-
-/// How far the weights of a fit may be from a sum of one. More is a singular matrix: all centroids
-/// are close to one line. Far above the rounding of a regular one; chosen by hand.
-const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
-
-/// What a fit may make of errors of the elements, at most: the sum of the weights' magnitudes. One
-/// end of a strip, extrapolated from both of its elements, has 2, the corner of a rectangle 2.5;
-/// slivers along a line had 36. Chosen by hand, well above what plain surfaces have.
-const MAX_AMPLIFICATION: f64 = 4.0;
-
-/// Vertices with at least this many elements around them are not grown across: every element there
-/// would have all others in its ring, which takes quadratic time. Six are usual, and the pole of a
-/// fine sphere has some hundred. Chosen by hand.
-const MAX_VALENCE: usize = 256;
-
 /// A vertex on the boundary of a smooth surface.
 pub(super) struct BoundaryVertex {
     /// Index of the vertex.
@@ -76,7 +58,8 @@ pub(super) fn boundary_vertices(
 /// Weights with which values at the centroids of `elements` sum up to that of their linear fit at
 /// `position`; empty if they do not define one.
 fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -> Vec<(u32, f64)> {
-    if elements.len() < MIN_FIT_POINTS {
+    // A plane through three elements passes exactly, and amplifies their noise.
+    if elements.len() < 4 {
         return vec![];
     }
     let (tangent, bitangent) = normal.any_orthonormal_pair();
@@ -96,15 +79,19 @@ fn linear_fit(mesh: &Mesh, elements: Vec<u32>, position: DVec3, normal: DVec3) -
     let weights: Vec<(u32, f64)> = rows.into_iter().map(|(e, x)| (e, first.dot(x))).collect();
     let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
     let amplification: f64 = weights.iter().map(|(_, weight)| weight.abs()).sum();
-    let is_regular = (sum - 1.0).abs() < MAX_WEIGHT_SUM_ERROR;
-    if is_regular && amplification < MAX_AMPLIFICATION { weights } else { vec![] }
+    // With all centroids close to one line the matrix is singular, and the sum is not 1. Errors of
+    // elements are amplified 2 times at the end of a strip, 2.5 times at the corner of a rectangle
+    // and 36 times by slivers along a line.
+    let is_regular = (sum - 1.0).abs() < 1e-6;
+    if is_regular && amplification < 4.0 { weights } else { vec![] }
 }
 
-/// The elements that share a vertex with one of `elements`, those included, ascending; see
-/// [`MAX_VALENCE`].
+/// The elements that share a vertex with one of `elements`, those included, ascending. Vertices of
+/// 256 elements and more are not grown across, which would take quadratic time: six are usual, and
+/// the pole of a fine sphere has about a hundred.
 fn ring(outlines: &ElementLoops, around: &Incidence, elements: &[u32]) -> Vec<u32> {
     let vertices = elements.iter().flat_map(|&e| outlines.of(e as usize));
-    let neighbours = vertices.map(|&v| around.at(v)).filter(|n| n.len() < MAX_VALENCE);
+    let neighbours = vertices.map(|&v| around.at(v)).filter(|n| n.len() < 256);
     let mut ring: Vec<u32> = neighbours.flatten().chain(elements).copied().collect();
     ring.sort_unstable();
     ring.dedup();

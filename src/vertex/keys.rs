@@ -58,7 +58,7 @@ pub(crate) struct Vertices {
     index: HashTable<u32>,
 }
 
-/// Elements whose vertices are found by one thread at a time. Chosen by hand.
+/// Elements of a parallel task; results do not depend on it.
 const ELEMENTS_A_TASK: usize = 4096;
 
 /// The vertices around each element, counter-clockwise: its corners, and those that finer

@@ -140,7 +140,7 @@ fn case_5_8_reflected_light_in_a_room() {
     for (rho, table) in reflectances.into_iter().zip(table) {
         let scene = room(rho);
         let mut settings = BakeSettings::elements_only(&scene);
-        (settings.solve.element_size, settings.solve.contact_levels) = (0.5, 0);
+        settings.solve.element_size = 0.5;
         // Light that is reflected is summed here, whichever wall it falls on.
         settings.solve.hemicube_resolution = 32;
         let baked = settings.bake(scene, &Backend::Cpu, keep_going).unwrap();

@@ -25,7 +25,7 @@ fn all_flux_of_a_lamp_is_received_however_near_it_is() {
         let lamp = Luminaire::new(even(7.0), DVec3::from_array(place), DVec3::NEG_Z);
         let scene = cube(&Material::grey("wall", 0.5)).with_luminaires(vec![lamp]).unwrap();
         let mut settings = BakeSettings::elements_only(&scene);
-        (settings.solve.element_size, settings.solve.contact_levels) = (0.1, 0);
+        settings.solve.element_size = 0.1;
         let baked = settings.bake(scene, &Backend::Cpu, keep_going).unwrap();
         // Of the half that reaches the near wall, middles of parts make 3 % more at its foot, less
         // around; below parts that are cut no further lies a twentieth of that half.

@@ -107,7 +107,6 @@ fn a_lamp_alone_has_no_error() {
 fn light_shot_too_coarsely_is_told() {
     let coarse = |settings: &mut BakeSettings| {
         settings.solve.element_size = 1e3;
-        settings.solve.contact_levels = 0;
         settings.solve.near_reach = -1.0;
         if let Some(gather) = &mut settings.gather {
             gather.refinement.gather_passes = 1;

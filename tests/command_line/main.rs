@@ -290,7 +290,7 @@ fn bake_gathers_without_a_gpu() {
 }
 
 #[test]
-fn verify_prints_what_was_told_beside_what_it_measures() {
+fn verify_prints_estimated_beside_measured_errors() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).display().to_string();
     lit_plates(folder.path());
@@ -318,7 +318,7 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     assert_eq!(lines[1][..3], ["floor", "100.00", "0.00"], "{table}");
     assert_eq!((lines[1][4], lines[2][4], lines[2][0]), ("12.50", "25.00", "all"), "{table}");
     assert!(lines[3].starts_with(&["known", "to"]) && !table.contains("lamp"), "{table}");
-    // Told 25 %, and measured 20 to 50 %; told 1 %, that is far off.
+    // 25 % estimated, and 20 to 50 % measured; 1 % estimated is far off.
     assert!(table.trim_end().ends_with("agree within a factor of 2"), "{table}");
     let text = std::fs::read_to_string(csv).unwrap();
     let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
@@ -345,7 +345,7 @@ fn verify_prints_what_was_told_beside_what_it_measures() {
     write(folder.path(), "lit.json", "{\"error\": {\"total\": 0.01}}");
     let said = run("verify", &args[..4]).stdout;
     let said = String::from_utf8_lossy(&said);
-    assert!(said.lines().last().unwrap().ends_with("times further off than it tells"), "{said}");
+    assert!(said.lines().last().unwrap().ends_with("times further off than estimated"), "{said}");
     // A file that tells its error itself, beside the report of another bake, and then alone.
     let told = header.replacen('\n', "\ncomment estimated error 30.001 % of reflected\n", 1);
     write(folder.path(), "lit.ply", &format!("{told}{corners}{lamp}{faces}"));
@@ -505,10 +505,7 @@ fn verify_wants_the_lamps_of_the_bake() {
         (out.status.success(), String::from_utf8(out.stderr).unwrap())
     };
     let dark = bake(&["--error", "0.1"]);
-    assert!(
-        dark.ends_with("no light falls on what reflects: there is no error to tell\n"),
-        "{dark}"
-    );
+    assert!(dark.ends_with("no light falls on what reflects: there is no error\n"), "{dark}");
     let (fine, said) = verify(&["--emit", "wall=2"]);
     assert!(!fine && said.contains("'wall' emits radiance 0,0,0, and 2,2,2"), "{said}");
     let lit = bake(&["--emit", "wall=2", "--time", "0.5"]);

@@ -155,7 +155,7 @@ fn solutions_are_measured_at_the_same_points() {
         check(other.error, (factor - 1.0).abs(), 0.01);
         assert_eq!((other.stop, other.paths), (Stop::Rounds, first.paths));
         let points = |of: &Verification| -> Vec<(DVec3, Rgb)> {
-            of.points.iter().map(|p| (p.position, p.found)).collect()
+            of.points.iter().map(|p| (p.position, p.measured)).collect()
         };
         assert!(points(&other) == points(&first));
     }
@@ -288,7 +288,7 @@ fn seeds_not_threads_make_the_points() {
         let mut settings = settings(0.1);
         settings.seed = seed;
         let found = pool.install(|| verify(&scene, &wrong, &settings, keep_going)).unwrap();
-        let points = found.points.iter().map(|p| (p.position, p.found)).collect::<Vec<_>>();
+        let points = found.points.iter().map(|p| (p.position, p.measured)).collect::<Vec<_>>();
         (found.error, points)
     };
     assert!(measure(1, 1) == measure(3, 1));
@@ -332,7 +332,8 @@ fn surfaces_in_one_place_are_told_apart() {
         settings.points_per_group = 64;
         let found = verify(&scene, &told, &settings, keep_going).unwrap();
         let on_sheets = found.points.iter().filter(|p| p.normal.z > 0.5);
-        let told_on = |group| on_sheets.clone().filter(move |p| p.group == group).map(|p| p.told.x);
+        let told_on =
+            |group| on_sheets.clone().filter(move |p| p.group == group).map(|p| p.solution.x);
         assert!(told_on(0).count() >= 64 && told_on(1).count() >= 64);
         assert!(told_on(0).all(|b| (b - first).abs() < 1e-12), "{first}");
         assert!(told_on(1).all(|b| (b - second).abs() < 1e-12), "{second}");

@@ -71,13 +71,13 @@ fn noise_counts_as_sampling_error_only() {
             let mut normal = Normal(seed << 32);
             // Vertices gather as the points do; half of their squared noise is left between them.
             let found = estimate_of(|_| Observation {
-                interpolated: Rgb::ONE + sigma * model::HALF.sqrt() * normal.rgb(),
+                interpolated: Rgb::ONE + sigma * AVERAGED_VARIANCE.sqrt() * normal.rgb(),
                 gathered: [0, 1].map(|_| Rgb::ONE + sigma * normal.rgb()),
                 next: Rgb::ZERO,
                 ..exact()
             });
             // Lengths over three channels, relative to |(1, 1, 1)|: sigma again.
-            let truth = sigma * model::HALF.sqrt();
+            let truth = sigma * AVERAGED_VARIANCE.sqrt();
             let spread = found.mesh.hypot(found.sampling);
             // |x|² of three normal numbers has a relative deviation of √(2/3): its mean over 1000
             // points is off by s = 2.6 %, plus the s that is added. Twice the mean square is
@@ -86,7 +86,7 @@ fn noise_counts_as_sampling_error_only() {
             let s = (2.0 / 3.0 / COUNT as f64).sqrt();
             assert!((spread / truth - 1.0).abs() < 7.0 * s, "{spread} {truth}");
             // All of it is noise, of which a part is called the mesh's.
-            let most = model::MAX_SAMPLING_SHARE.sqrt() * spread;
+            let most = 0.7f64.sqrt() * spread;
             assert!((found.sampling - most).abs() < 1e-12, "{found:?}");
         }
     }
@@ -118,7 +118,7 @@ fn bias_and_noise_add_up_as_squares() {
     // more is added.
     assert!((found.total / bias - 1.0).abs() < 0.05, "{found:?}");
     // The noise of a gather, of which vertices would have half, squared: 2.6 % off, four times.
-    assert!((found.sampling / (sigma * model::HALF.sqrt()) - 1.0).abs() < 0.06, "{found:?}");
+    assert!((found.sampling / (sigma * AVERAGED_VARIANCE.sqrt()) - 1.0).abs() < 0.06, "{found:?}");
 }
 
 #[test]

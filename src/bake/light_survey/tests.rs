@@ -79,18 +79,18 @@ fn region_is_that_of_the_light() {
 }
 
 #[test]
-fn places_see_closed_form_factors() {
+fn points_see_closed_form_factors() {
     let floor = (level(0.01, 0.0, true), grey());
     let lamp = (level(1.0, 1.0, false), glow());
     let scene = scene(&[floor, lamp]);
-    let seen = look(&scene, &strongest_lights(&scene), &places(&scene));
+    let seen = look(&scene, &strongest_lights(&scene), &survey_points(&scene));
     // A point below the middle of a square of side 2 at distance 1: 4 corner terms (Howell, C-4).
     let r = 1.0 / 2f64.sqrt();
     let expected = 4.0 / PI * r * r.atan();
     // The floor is 1 % of the distance wide: 1e-4 off, and rays see all of the lamp.
     assert!(seen.iter().all(|s| (s.irradiance.x - expected).abs() < 2e-4), "{expected} {seen:?}");
-    let area: f64 = places(&scene).iter().map(|place| place.area).sum();
-    assert!((area / 4e-4 - 1.0).abs() < 1e-9, "places stand for all of the area");
+    let area: f64 = survey_points(&scene).iter().map(|point| point.area).sum();
+    assert!((area / 4e-4 - 1.0).abs() < 1e-9, "points stand for all of the area");
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn a_sky_lights_what_nothing_is_above() {
     let sheltered = scene(&[(level(1.0, 2.0, true), grey()), floor, roof]);
     let survey = LightSurvey::new(&sheltered.with_sky(Rgb::ONE).unwrap());
     assert_eq!((survey.region, survey.gathered_materials), (None, vec![]));
-    let samples = look(&open, &[], &places(&open));
+    let samples = look(&open, &[], &survey_points(&open));
     assert!(samples.iter().all(|sample| sample.escaped == 1.0));
 }
 

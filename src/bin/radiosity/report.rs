@@ -88,7 +88,7 @@ impl Report {
             "gathers": baked.light.gather_count,
             "gather_change": baked.light.relative_change,
             "gather_stop": self.gather_stop(),
-            "near_moved": baked.mean_near_correction,
+            "near_correction": baked.mean_near_correction,
             "stop": baked.solution.stop.to_string(),
             "ledger": ledger(&baked.solution.ledger),
             "error": self.errors(),
@@ -96,7 +96,7 @@ impl Report {
             "seconds": {
                 "load": self.load, "open": self.open, "mesh": s.mesh, "draw": s.draw,
                 "reduce": s.reduce, "readback": s.readback, "solve": s.solve,
-                "vertices": s.vertices, "certificate": s.estimate, "write": self.write,
+                "vertices": s.vertices, "estimate": s.estimate, "write": self.write,
                 "total": self.total,
             },
             "camera": self.picture.map(|Picture { camera, .. }| json!({
@@ -165,18 +165,20 @@ impl Report {
     /// Whether what was asked for was reached.
     fn outcome(&self) -> Option<String> {
         let baked = &self.baked;
-        let told = 100.0 * baked.estimate.total;
+        let estimated = 100.0 * baked.estimate.total;
         if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) && !self.stopped {
-            return Some("no light falls on what reflects: there is no error to tell".into());
+            return Some("no light falls on what reflects: there is no error".into());
         }
         let (error, each) = match self.target {
             Target::Error(error) => (error, ""),
             Target::ErrorEach(error) => (error, " for each group"),
             _ if self.stopped => {
-                return Some(format!("stopped: this is what there was, about {told:.2} % off"));
+                return Some(format!(
+                    "stopped: this is what there was, about {estimated:.2} % off"
+                ));
             }
             Target::Seconds(_) => {
-                return Some(format!("as exact as the time allowed: about {told:.2} %"));
+                return Some(format!("as exact as the time allowed: about {estimated:.2} %"));
             }
             Target::Settings(_) => {
                 return Some("no error asked for: --error 0.05 goes on until 5 %".into());
@@ -199,7 +201,7 @@ impl Report {
         };
         // In the digits that it was asked in.
         let (asked, outcome) = ((100.0 * error) as f32, baked.outcome);
-        Some(format!("{asked} %{each} {outcome} (about {told:.2} %){remedy}"))
+        Some(format!("{asked} %{each} {outcome} (about {estimated:.2} %){remedy}"))
     }
 
     /// Why gathering stopped.
@@ -240,7 +242,7 @@ impl Report {
                 baked.solution.stop
             ),
             format!(
-                "gathering  {} places, {}, changed the vertices by {:.2} %",
+                "gathering  {} points, {}, changed the vertices by {:.2} %",
                 light.gather_count,
                 self.gather_stop(),
                 100.0 * light.relative_change
@@ -301,8 +303,8 @@ fn parts(error: &ErrorEstimate) -> Value {
     json!({
         "total": error.total, "uncertainty": error.uncertainty, "tail": error.tail,
         "mesh": error.mesh,
-        "sampling": error.sampling, "settling": error.truncation,
-        "unshot": error.unshot, "sources": error.sources, "places": error.samples,
+        "sampling": error.sampling, "truncation": error.truncation,
+        "unshot": error.unshot, "sources": error.sources, "samples": error.samples,
         "paths": error.paths,
     })
 }

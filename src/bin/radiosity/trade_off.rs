@@ -69,7 +69,7 @@ struct Measured {
     /// The plain root mean square: with the tail.
     error_with_tail: Estimate,
     /// The error that the bake itself estimates.
-    told: f64,
+    estimated: f64,
     vertices: usize,
     /// The settings used in the end.
     settings: BakeSettings,
@@ -214,13 +214,14 @@ impl Measured {
             seconds: baked.timings.total(),
             error: found.error.unwrap_or_default(),
             error_with_tail: found.error_with_tail.unwrap_or_default(),
-            told: baked.estimate.total,
+            estimated: baked.estimate.total,
             vertices: baked.light.surface.positions.len(),
             settings: baked.settings.clone(),
         }
     }
 
-    /// The error, or its standard error where that is larger: a smaller error is not told from it.
+    /// The error, or its standard error where that is larger: a smaller error is not distinguished
+    /// from it.
     fn known_error(&self) -> f64 {
         self.error.value.max(self.error.standard_error).max(1e-6)
     }

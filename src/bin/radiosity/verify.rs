@@ -215,7 +215,7 @@ fn time(text: &str) -> Parsed<Limit> {
     text.parse().ok().and_then(limit).ok_or_else(|| give("seconds, such as 10, or inf"))
 }
 
-/// The error that the report of a bake claims.
+/// The report of a bake: the error that it estimated, and its light.
 #[derive(Default)]
 struct Claimed(Json);
 
@@ -250,7 +250,7 @@ impl Claimed {
     /// # Errors
     /// [`ErrorKind::Setting`] with the sky that it was baked under.
     fn check_sky(&self, scene: &Scene, own: Option<String>, ply: &Path) -> Result<(), Error> {
-        let (same, told) = match &self.0["sky"] {
+        let (same, baked) = match &self.0["sky"] {
             Json::String(words) => (own.as_ref() == Some(words), words.clone()),
             Json::Array(channels) => {
                 let [r, g, b] =
@@ -267,8 +267,8 @@ impl Claimed {
         if same {
             return Ok(());
         }
-        let found = format!("baked under a sky of {told}");
-        let remedy = format!("verify it under the same: --sky {told}");
+        let found = format!("baked under a sky of {baked}");
+        let remedy = format!("verify it under the same: --sky {baked}");
         Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
     }
 
@@ -277,12 +277,12 @@ impl Claimed {
     /// # Errors
     /// [`ErrorKind::Setting`] with how many there were.
     fn check_luminaires(&self, own: &Json, ply: &Path) -> Result<(), Error> {
-        let told = &self.0["luminaires"];
+        let baked = &self.0["luminaires"];
         let count = |list: &Json| list.as_array().map_or(0, Vec::len);
-        if told.is_null() || told == own || count(told) + count(own) == 0 {
+        if baked.is_null() || baked == own || count(baked) + count(own) == 0 {
             return Ok(());
         }
-        let found = format!("baked with {} luminaires, which are not these", count(told));
+        let found = format!("baked with {} luminaires, which are not these", count(baked));
         let remedy = "verify it with the same: --luminaire and --luminaires as for the bake";
         Err(Error::new(ErrorKind::Setting, ply.display().to_string(), found, remedy))
     }
@@ -348,7 +348,7 @@ fn table(lines: &[Line]) -> String {
         let ratio = line.ratio().map_or("–".into(), |ratio| format!("{ratio:.2}"));
         let name: String = line.name.chars().take(width).collect();
         format!(
-            "{name:<width$} {:>7.2} {:>8.2} {:>7} {:>7} {measured:>15} {ratio:>13}",
+            "{name:<width$} {:>7.2} {:>8.2} {:>7} {:>11} {measured:>15} {ratio:>6}",
             100.0 * line.area_share,
             100.0 * line.hidden_share,
             line.points,
@@ -356,8 +356,8 @@ fn table(lines: &[Line]) -> String {
         )
     };
     let mut out = format!(
-        "{:<width$} {:>7} {:>8} {:>7} {:>7} {:>15} {:>13}\n",
-        "group", "area %", "hidden %", "points", "told %", "measured %", "told/measured"
+        "{:<width$} {:>7} {:>8} {:>7} {:>11} {:>15} {:>6}\n",
+        "group", "area %", "hidden %", "points", "estimated %", "measured %", "ratio"
     );
     shown.iter().for_each(|line| out += &(row(line) + "\n"));
     if !rest.is_empty() {
@@ -368,7 +368,7 @@ fn table(lines: &[Line]) -> String {
 
 /// The table as CSV, errors as shares.
 fn csv(lines: &[Line]) -> Vec<u8> {
-    let head = "group,area_share,hidden_share,points,told,measured,standard_error,told/measured";
+    let head = "group,area_share,hidden_share,points,estimated,measured,standard_error,ratio";
     let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
     let rows = lines.iter().map(|line| {
         vec![

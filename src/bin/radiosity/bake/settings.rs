@@ -99,8 +99,6 @@ const SETTINGS: &[Setting] = &[
     setting!(solve.element_size,
         "longest edge of an element that light is shot on, scene unit [by the error; without one, \
          diagonal / 32 at least]"),
-    setting!(solve.contact_levels,
-        "levels by which elements are split that other surfaces touch [by the error; without, 3]"),
     setting!(solve.hemicube_resolution,
         "pixels along an edge of a hemicube's top face, even, for patches that shoot much; dimmer \
          ones have a half or a quarter of them, 16 at least [by the error; without one, 128]"),

@@ -10,18 +10,18 @@ impl Results {
         let mut order: Vec<usize> = (0..self.runs.len()).collect();
         order.sort_by(|&a, &b| self.runs[a].1.seconds.total_cmp(&self.runs[b].1.seconds));
         let mut out = format!(
-            "{:>26} {:>9} {:>14} {:>14} {:>7} {:>9}\n",
-            "run", "seconds", "error %", "with tail %", "told %", "vertices"
+            "{:>26} {:>9} {:>14} {:>14} {:>11} {:>9}\n",
+            "run", "seconds", "error %", "with tail %", "estimated %", "vertices"
         );
         for k in order {
             let (run, m) = &self.runs[k];
             let [error, with_tail] = [m.error, m.error_with_tail]
                 .map(|e| format!("{:.2} ± {:.2}", 100.0 * e.value, 100.0 * e.standard_error));
             out += &format!(
-                "{:>26} {:>9.2} {error:>14} {with_tail:>14} {:>7.2} {:>9} {}\n",
+                "{:>26} {:>9.2} {error:>14} {with_tail:>14} {:>11.2} {:>9} {}\n",
                 run.name(),
                 m.seconds,
-                100.0 * m.told,
+                100.0 * m.estimated,
                 m.vertices,
                 if self.front.contains(&k) { "best" } else { "" }
             );
@@ -29,7 +29,7 @@ impl Results {
         let tail = 100.0 * self.measure.tail;
         out + &format!(
             "best: no other fixed settings are both faster and better; error: without the {tail} % \
-             of the\narea where it is largest; told: by the bake itself"
+             of the\narea where it is largest; estimated: by the bake itself"
         )
     }
 
@@ -57,7 +57,7 @@ impl Results {
             ("standard_error", m.error.standard_error.to_string()),
             ("error_with_tail", m.error_with_tail.value.to_string()),
             ("standard_error_with_tail", m.error_with_tail.standard_error.to_string()),
-            ("told", m.told.to_string()),
+            ("estimated", m.estimated.to_string()),
             ("vertices", m.vertices.to_string()),
             ("best", u8::from(self.front.contains(&k)).to_string()),
         ];

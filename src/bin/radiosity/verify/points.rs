@@ -135,11 +135,13 @@ fn vector(value: &Value) -> Option<DVec3> {
 /// The points of a verification as an ASCII PLY file, coloured by their errors.
 pub fn coloured_ply(found: &Verification) -> String {
     let mut out = format!(
-        "ply\nformat ascii 1.0\ncomment error: a share; reflected radiosity, told and found: W/m2\n\
+        "ply\nformat ascii 1.0\n\
+         comment error: a share; reflected radiosity of the solution and measured: W/m2\n\
          element vertex {}\n",
         found.points.len()
     );
-    let names = "x y z nx ny nz error told_r told_g told_b found_r found_g found_b standard_error";
+    let names = "x y z nx ny nz error solution_r solution_g solution_b measured_r measured_g \
+                 measured_b standard_error";
     names.split(' ').for_each(|name| out += &format!("property float {name}\n"));
     for name in ["red", "green", "blue", "hidden"] {
         out += &format!("property uchar {name}\n");
@@ -148,7 +150,7 @@ pub fn coloured_ply(found: &Verification) -> String {
     let usual = found.error.map_or(0.0, |error| error.value);
     for point in &found.points {
         let places = [point.position, point.normal].map(|v| v.to_array()).concat();
-        let light = [point.told, point.found].map(|v| v.to_array()).concat();
+        let light = [point.solution, point.measured].map(|v| v.to_array()).concat();
         let words = [places, vec![point.error], light, vec![point.standard_error]].concat();
         let words: Vec<String> = words.iter().map(|x| (*x as f32).to_string()).collect();
         let [r, g, b] = if point.hidden { [128; 3] } else { colour(point.error, usual) };
