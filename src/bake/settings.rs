@@ -162,8 +162,8 @@ impl BakeSettings {
     }
 
     /// Lengths on each group as shares of its own diagonal, where that is smaller than that of
-    /// where the light is: for an error that every group is to meet.
-    pub(super) fn scale_groups(&mut self, scene: &Scene) {
+    /// where the light is: for an `error` that every group is to meet.
+    pub(super) fn scale_groups(&mut self, error: f64, scene: &Scene) {
         let diagonal = self.solve.light_diagonal(scene);
         let mut bounds = vec![Aabb::EMPTY; scene.groups().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
@@ -176,6 +176,8 @@ impl BakeSettings {
         };
         if let Some(gather) = &mut self.gather {
             gather.refinement.group_scales = bounds.into_iter().map(scale).collect();
+            // Groups have to meet the error with a standard error added.
+            gather.refinement.mesh_error = gather.refinement.mesh_error.min(0.5 * error);
         }
     }
 

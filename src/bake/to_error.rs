@@ -34,7 +34,7 @@ pub(super) fn bake_to_error(
     check_error(target.error)?;
     let mut settings = BakeSettings::for_error(target.error, scene);
     if target.each_group {
-        settings.scale_groups(scene);
+        settings.scale_groups(target.error, scene);
     }
     (target.overrides)(&mut settings);
     pipeline::run(&settings, scene, backend, Some(target), progress)
