@@ -238,9 +238,9 @@ impl<'a> AdaptiveGather<'a> {
                 Some(coarse) => coarse,
                 None => &mut *last,
             };
-            // What others receive of an edge of light is blurred. With edges 1 or 3 times as long the
-            // errors of four scenes are alike, and the Cornell box on a wide plane, each group to
-            // 10 %, takes 34 or 15 s.
+            // What others receive of an edge of light is blurred. With edges 1 or 3 times as long
+            // the errors of four scenes are alike, and the Cornell box on a wide plane, each group
+            // to 10 %, takes 34 or 15 s.
             let first = RefinementSettings {
                 min_edge: 3.0 * settings.min_edge,
                 // A quarter of the rays has 4^0.75 times the noise, which would split the few
