@@ -34,6 +34,7 @@ mod source_light;
 mod surplus;
 pub(crate) mod two_sided;
 pub(crate) mod vertex_rows;
+pub(crate) mod visible;
 
 use glam::DVec3;
 

@@ -241,16 +241,12 @@ impl<'a> AdaptiveGather<'a> {
             // What others receive of an edge of light is blurred. With edges 1 or 3 times as long
             // the errors of four scenes are alike, and the Cornell box on a wide plane, each group
             // to 10 %, takes 34 or 15 s.
-            let first = RefinementSettings {
-                min_edge: 3.0 * settings.min_edge,
-                // A quarter of the rays has 4^0.75 times the noise, which would split the few
-                // elements of a small group.
-                mesh_error: match settings.group_scales.is_empty() {
-                    true => settings.mesh_error,
-                    false => 3.0 * settings.mesh_error,
-                },
-                ..settings.clone()
-            };
+            let mut first = coarser(settings, 1);
+            // A quarter of the rays has 4^0.75 times the noise, which would split the few elements
+            // of a small group.
+            if settings.group_scales.is_empty() {
+                first.mesh_error = settings.mesh_error;
+            }
             if self.gather_pass(&first, gatherer, probes.as_deref_mut(), progress)?
                 == StopReason::Cancelled
                 || self.add_further_bounces(rows, progress) == StopReason::Cancelled

@@ -69,13 +69,7 @@ impl Batch<'_> {
             let is_hidden = outlook([sample; 2]).is_hidden(diagonal);
             let direct = match light {
                 Some(light) if !is_buried => {
-                    let point = points.point(v, attempt);
-                    let kept_apart = sample.directional;
-                    let arriving = kept_apart.unwrap_or_else(|| light.irradiance(&point));
-                    Direct {
-                        unoccluded: albedo * light.unoccluded(&point),
-                        arriving: albedo * arriving,
-                    }
+                    light.reflected(albedo, &points.point(v, attempt), sample.directional)
                 }
                 _ => Direct::default(),
             };

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::GatherPoint;
 use super::luminaire_light::LuminaireLight;
 use super::two_sided::TwoSidedPoint;
-use crate::sampling::low_discrepancy::sobol_02_point;
-use crate::sampling::rotation::{CellRotation, second_rotation};
+use super::visible::Visible;
+use crate::sampling::rotation::CellRotation;
 use crate::scene::{Rgb, Scene, Sun};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
@@ -51,8 +51,15 @@ impl DirectionalLight {
         })
     }
 
+    /// What it adds to the reflected radiosity of a surface of this `albedo` at `point`, where it
+    /// causes the irradiance `arriving` (W/m²), if that is known; else rays are cast for it.
+    pub fn reflected(&self, albedo: Rgb, point: &TwoSidedPoint, arriving: Option<Rgb>) -> Direct {
+        let arriving = arriving.unwrap_or_else(|| self.irradiance(point));
+        Direct { unoccluded: albedo * self.unoccluded(point), arriving: albedo * arriving }
+    }
+
     /// Irradiance that it would cause at `point` if nothing were in its way, W/m² per channel.
-    pub fn unoccluded(&self, point: &TwoSidedPoint) -> Rgb {
+    fn unoccluded(&self, point: &TwoSidedPoint) -> Rgb {
         let of_sun = |point: &GatherPoint| match self.scene.sky().sun() {
             Some(sun) => {
                 let cosine = point.normal.dot(sun.direction);
@@ -64,7 +71,7 @@ impl DirectionalLight {
     }
 
     /// Irradiance that it causes at `point`, W/m² per channel.
-    pub fn irradiance(&self, point: &TwoSidedPoint) -> Rgb {
+    fn irradiance(&self, point: &TwoSidedPoint) -> Rgb {
         let sun = self.scene.sky().sun();
         on_both_sides(point, |point| {
             let of_sun = sun.map_or(Rgb::ZERO, |sun| self.of_sun(sun, point));
@@ -83,27 +90,13 @@ impl DirectionalLight {
 
     fn of_sun(&self, sun: &Sun, point: &GatherPoint) -> Rgb {
         let rotation = self.rotations.at(point.position, point.near);
-        let second_rotation = second_rotation(rotation);
-        let (mut seen, mut all) = (Rgb::ZERO, 0.0);
-        for (start, end) in [(0, RAYS_TO_SUN[0]), (RAYS_TO_SUN[0], RAYS_TO_SUN[1])] {
-            for [x, y] in (start..end).map(sobol_02_point) {
-                let towards = sun.towards([(x + second_rotation).fract(), (y + rotation).fract()]);
-                let cosine = point.normal.dot(towards).max(0.0);
-                let reach = point.near..f64::INFINITY;
-                all += cosine;
-                if cosine > 0.0
-                    && !self.rays.occluded(point.position, towards, reach.clone(), |_| true)
-                {
-                    seen += cosine * self.panes.transmittance(point.position, towards, reach);
-                }
-            }
-            if seen == Rgb::ZERO || seen == Rgb::splat(all) {
-                break;
-            }
+        let rays = |range| Visible::of_sun(sun, point, rotation, range, &self.rays, &self.panes);
+        let [few, all] = RAYS_TO_SUN;
+        let mut visible = rays(0..few);
+        if visible.seen != Rgb::ZERO && visible.seen != Rgb::splat(visible.all) {
+            visible.add(&rays(few..all));
         }
-        let unoccluded = sun.unoccluded(point.normal.dot(sun.direction));
-        let share = seen / f64::max(all, f64::MIN_POSITIVE);
-        unoccluded.unwrap_or(sun.irradiance * (all / f64::from(RAYS_TO_SUN[1]))) * share
+        visible.irradiance_of_sun(sun, point)
     }
 }
 

@@ -38,8 +38,11 @@ pub(super) fn resolve_shadow_edges(
     for (reflected, direct) in samples.reflected.iter_mut().zip(&samples.direct) {
         *reflected -= direct.arriving;
     }
+    let counted = |e| counted_area(&samples, scale, settings, e);
+    let area: f64 = (0..samples.mesh.element_count()).map(counted).sum();
+    let negligible = NEGLIGIBLE_SHARE * settings.mesh_error.powi(2) * area;
     loop {
-        let mut crossed = crossed_elements(&samples, scale, settings);
+        let mut crossed = crossed_elements(&samples, scale, settings, negligible);
         let room = settings.max_elements.saturating_sub(samples.mesh.element_count()) / 3;
         crossed.truncate(room);
         if crossed.is_empty() {
@@ -49,13 +52,7 @@ pub(super) fn resolve_shadow_edges(
         let (mut finer, old_numbers) = samples.with_split(&crossed)?;
         let points = VertexGatherPoints::new(&finer.mesh, &finer.vertices, scale.touching());
         let new = new_vertices(&old_numbers);
-        let at = |&v: &u32| {
-            let (albedo, point) = (points.albedo(v), points.point(v, 0));
-            Direct {
-                unoccluded: albedo * light.unoccluded(&point),
-                arriving: albedo * light.irradiance(&point),
-            }
-        };
+        let at = |&v: &u32| light.reflected(points.albedo(v), &points.point(v, 0), None);
         let direct: Vec<Direct> = new.par_iter().map(at).collect();
         for (v, direct) in new.into_iter().zip(direct) {
             finer.direct[v as usize] = direct;
@@ -69,19 +66,21 @@ pub(super) fn resolve_shadow_edges(
 }
 
 /// The elements that an edge crosses and that may be off by more than `settings` allow, those with
-/// the largest squared error times area first. `samples` reflect all
-/// light but that.
+/// the largest squared error times area first; without the smallest, as many as have `negligible`
+/// together. `samples` reflect all light but that of the shadows.
 fn crossed_elements(
     samples: &SampledMesh,
     scale: &ErrorScale,
     settings: &RefinementSettings,
+    mut negligible: f64,
 ) -> Vec<usize> {
     let error = |(e, outline): (usize, &[u32])| {
         let is_buried = outline.iter().any(|&v| samples.buried[v as usize]);
         if is_buried || !samples.is_splittable(e) || is_finest(samples, scale, settings, e) {
             return None;
         }
-        let emitted = samples.mesh.material(samples.mesh.element(e)).exitance;
+        let node = samples.mesh.element(e);
+        let emitted = samples.mesh.material(node).exitance;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut darkest, mut brightest) = (f64::INFINITY, 0f64);
         for v in outline.iter().map(|&v| v as usize) {
@@ -94,15 +93,12 @@ fn crossed_elements(
         }
         let jump = (high - low).max(0.0) * brightest;
         let error = RMS_OVER_JUMP * jump / darkest.max(scale.radiosity_floor);
-        let allowed = settings.mesh_error * settings.group_factor(group(samples, e));
+        let allowed = settings.mesh_error * settings.group_factor(samples.mesh.group(node));
         (error > allowed).then(|| (error * error * counted_area(samples, scale, settings, e), e))
     };
     let all: Vec<(usize, &[u32])> = samples.vertices.outlines.iter().collect();
     let mut crossed: Vec<(f64, usize)> = all.par_iter().copied().filter_map(error).collect();
     crossed.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // The smallest, as many as are negligible together.
-    let area: f64 = all.iter().map(|&(e, _)| counted_area(samples, scale, settings, e)).sum();
-    let mut negligible = NEGLIGIBLE_SHARE * settings.mesh_error.powi(2) * area;
     while let Some(&(square, _)) = crossed.last()
         && square <= negligible
     {
@@ -110,8 +106,4 @@ fn crossed_elements(
         crossed.pop();
     }
     crossed.into_iter().map(|(_, e)| e).collect()
-}
-
-fn group(samples: &SampledMesh, e: usize) -> u32 {
-    samples.mesh.group(samples.mesh.element(e))
 }

@@ -13,9 +13,10 @@
 mod direct_light;
 mod doubled;
 mod near_field;
+mod point_on;
 mod point_rows;
 mod scene_rays;
-mod visible;
+
 mod wide_light;
 
 use std::f64::consts::PI;
@@ -26,6 +27,7 @@ use rayon::prelude::*;
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::NO_LIGHT;
 use crate::gather::luminaire_light::LuminaireLight;
+use crate::gather::visible::Visible;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
 use crate::sampling::hemisphere::{self, HemisphereSamples};
@@ -36,7 +38,6 @@ use doubled::{Doubled, RaySums};
 use near_field::{NearField, NearLight, NearRay};
 pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
 use scene_rays::SceneRays;
-use visible::Visible;
 use wide_light::WideLight;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.

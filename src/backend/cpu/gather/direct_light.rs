@@ -8,10 +8,11 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::doubled::RaySums;
+use super::point_on::{PointOn, point_on};
 use super::scene_rays::SceneRays;
-use super::visible::{PointOn, Visible, point_on};
 use super::wide_light::WideLight;
 use crate::gather::GatherPoint;
+use crate::gather::visible::Visible;
 use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::geometry::polygon::clip;
 use crate::sampling::low_discrepancy::sobol_02_point;
@@ -125,21 +126,8 @@ impl<'a> DirectLight<'a> {
     /// Sums of cosines at the point, over points of `range` spread over the sun: of the visible
     /// ones, and of all above the horizon.
     pub fn rays_to_sun(&self, sun: &Sun, range: Range<u32>) -> Visible {
-        let (scene, point) = (self.scene, self.point);
-        let mut out = Visible { points: f64::from(range.end - range.start), ..Default::default() };
-        let second_rotation = second_rotation(self.rotation);
-        for [x, y] in range.map(sobol_02_point) {
-            let at = [(x + second_rotation).fract(), (y + self.rotation).fract()];
-            let direction = sun.towards(at);
-            let cosine = point.normal.dot(direction).max(0.0);
-            let reach = point.near..f64::INFINITY;
-            out.all += cosine;
-            let (from, any) = (point.position, |_: &Hit| true);
-            if cosine > 0.0 && !scene.surfaces.occluded(from, direction, reach.clone(), any) {
-                out.seen += cosine * scene.panes.transmittance(from, direction, reach);
-            }
-        }
-        out
+        let SceneRays { surfaces, panes, .. } = self.scene;
+        Visible::of_sun(sun, self.point, self.rotation, range, surfaces, panes)
     }
 
     /// Form factors from the point to the visible part of a light, and to all of it unoccluded,
@@ -176,12 +164,7 @@ impl ShadowRays<'_> {
     /// The irradiance of the sun, W/m² per channel.
     pub fn of_sun(&self) -> Rgb {
         let DirectLight { point, sun, .. } = self.light;
-        let Some(sun) = sun else { return Rgb::ZERO };
-        let Visible { points, seen, all } = self.sun;
-        match sun.unoccluded(point.normal.dot(sun.direction)) {
-            Some(irradiance) => irradiance * (seen / all.max(f64::MIN_POSITIVE)),
-            None => sun.irradiance * (seen / points.max(1.0)),
-        }
+        sun.map_or(Rgb::ZERO, |sun| self.sun.irradiance_of_sun(sun, point))
     }
 }
 

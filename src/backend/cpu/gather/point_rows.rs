@@ -6,10 +6,10 @@ use super::RayGather;
 use super::direct_light::DirectLight;
 use super::near_field::{NearField, NearLight, NearRay};
 use super::scene_rays::{RAYS_PER_SHADOW_RAY, SceneRays};
-use super::visible::Visible;
 use crate::gather::GatherPoint;
 use crate::gather::lights::NO_LIGHT;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
+use crate::gather::visible::Visible;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
 

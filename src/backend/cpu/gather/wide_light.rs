@@ -18,8 +18,9 @@ use crate::gather::lights::Light;
 use crate::sampling::low_discrepancy::sobol_02_point;
 use crate::scene::{Rgb, Scene};
 
+use super::point_on::point_on;
 use super::scene_rays::RAYS_PER_SHADOW_RAY;
-use super::visible::{Visible, point_on};
+use crate::gather::visible::Visible;
 
 /// A light seen from a point.
 pub(super) struct WideLight {

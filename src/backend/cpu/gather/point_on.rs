@@ -1,4 +1,4 @@
-//! Visible share of a light: by points on it, or by rays towards it.
+//! Points on a light, and the form factors that they estimate.
 
 use std::f64::consts::PI;
 
@@ -6,17 +6,7 @@ use glam::DVec3;
 
 use crate::gather::GatherPoint;
 use crate::gather::lights::Light;
-use crate::scene::{Rgb, Scene};
-
-/// Sums of form factors over points on a light, or over rays towards it, all with equal weight.
-#[derive(Debug, Default)]
-pub(super) struct Visible {
-    pub points: f64,
-    /// Of those that are visible; times the transmittance of panes, per channel.
-    pub seen: Rgb,
-    /// Of all that are above the horizon and face the point.
-    pub all: f64,
-}
+use crate::scene::Scene;
 
 /// A point on a light.
 pub(super) struct PointOn {
@@ -49,21 +39,4 @@ pub(super) fn point_on(
     let lit = facing > 0.0 && above > 0.0;
     let factor = light.surface.total_area() * facing * above / (PI * r2 * r2);
     PointOn { to, factor: if lit { factor } else { 0.0 }, is_hole }
-}
-
-impl Visible {
-    /// The value of one unit of `seen`: a share of the form factor of all of the light where that
-    /// is known in closed form, else of the points.
-    pub fn share_of(&self, unoccluded: Option<f64>) -> f64 {
-        match unoccluded {
-            Some(factor) => factor / self.all.max(1e-300),
-            None => 1.0 / self.points.max(1.0),
-        }
-    }
-
-    pub fn add(&mut self, other: &Visible) {
-        self.points += other.points;
-        self.seen += other.seen;
-        self.all += other.all;
-    }
 }
