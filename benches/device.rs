@@ -11,14 +11,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::{TracedGather, TracedRows};
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{HemicubeRows, TracedGather, TracedRows};
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::mesh::NodeId;
-use radiosity::{
-    Error, FormFactors, Gather, Gpu, HemicubeRows, Material, Mesh, RayRows, Rgb, Scene, Triangle,
-    load_obj,
-};
+use radiosity::{Error, FormFactors, Gather, Gpu, Material, Mesh, Rgb, Scene, Triangle, load_obj};
 
 /// Rays of a point over the hemisphere.
 const RAYS: u32 = 256;

@@ -28,11 +28,11 @@ use common::{keep_going, truth};
 use glam::DVec3;
 use radiosity::accuracy::Measure;
 use radiosity::backend::cpu::RayGather;
-use radiosity::bake::GatherSettings;
+use radiosity::bake::{ErrorEstimate, GatherSettings};
 use radiosity::gather::GatherPoint;
 use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorEstimate, Gather, GatheredMesh, Rgb,
-    Scene, VertexMesh, load_obj,
+    Backend, BakeResult, BakeSettings, BakeTarget, Error, Gather, GatheredMesh, Rgb, Scene,
+    VertexMesh, load_obj,
 };
 
 /// The error around whose settings others are varied.

@@ -15,8 +15,10 @@ mod common;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use radiosity::backend::gpu::HemicubeRows;
+use radiosity::bake::Timings;
 use radiosity::mesh::NodeId;
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh, Timings};
+use radiosity::{FormFactors, Gpu, Mesh};
 
 fn stages(c: &mut Criterion) {
     let gpu = common::gpu();

@@ -12,9 +12,10 @@ mod common;
 use std::time::Instant;
 
 use common::{keep_going, truth};
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::{ProximityCorrection, Row};
 use radiosity::mesh::NodeId;
-use radiosity::{Error, FormFactors, HemicubeRows, Mesh, Solver, VertexMesh};
+use radiosity::{Error, FormFactors, Mesh, Solver, VertexMesh};
 
 const TRUTH: &str = include_str!("../tests/data/cornell_box.truth.json");
 

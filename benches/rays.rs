@@ -10,10 +10,10 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
+use radiosity::backend::cpu::{RayGather, RayRows};
 use radiosity::gather::{GatherPoint, RadiosityField};
 use radiosity::mesh::NodeId;
-use radiosity::{Camera, FormFactors, Gather, Mesh, RayRows, Rgb, Scene, VertexMesh};
+use radiosity::{Camera, FormFactors, Gather, Mesh, Rgb, Scene, VertexMesh};
 
 /// Rays of a row and of a gather, and how many of each an iteration makes.
 const ROW_RAYS: u32 = 1024;

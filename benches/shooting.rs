@@ -9,9 +9,10 @@ mod common;
 use std::collections::HashMap;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::Row;
 use radiosity::mesh::NodeId;
-use radiosity::{Error, FormFactors, Mesh, RayRows, Solver, VertexMesh};
+use radiosity::{Error, FormFactors, Mesh, Solver, VertexMesh};
 
 /// Hands out rows that were made before.
 struct Stored<'a>(&'a HashMap<NodeId, Row>);

@@ -6,9 +6,8 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use radiosity::{
-    Backend, BakeProgress, BakeTarget, Camera, load_obj, write_exr, write_ply, write_png,
-};
+use radiosity::bake::BakeProgress;
+use radiosity::{Backend, BakeTarget, Camera, load_obj, write_exr, write_ply, write_png};
 
 fn main() -> Result<(), radiosity::Error> {
     let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;

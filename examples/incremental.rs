@@ -5,8 +5,9 @@
 use std::ops::ControlFlow;
 
 use glam::{DAffine3, DVec3};
+use radiosity::backend::cpu::RayRows;
 use radiosity::solver::SolveSession;
-use radiosity::{Error, Mesh, RayRows, Solver, load_obj};
+use radiosity::{Error, Mesh, Solver, load_obj};
 
 fn main() -> Result<(), Error> {
     let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;

@@ -7,6 +7,7 @@
 use std::ops::ControlFlow;
 
 use radiosity::backend::cpu::RayGather;
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::ProximityCorrection;
 use radiosity::gather::{RefinementSettings, gather_at_vertices};
 use radiosity::*;

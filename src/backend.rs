@@ -110,7 +110,7 @@ impl Backend {
     /// The same with this row maker, if the backend has it; else with rays on the CPU.
     ///
     /// # Errors
-    /// Those of [`HemicubeRows::new`](crate::HemicubeRows::new),
+    /// Those of [`HemicubeRows::new`](crate::backend::gpu::HemicubeRows::new),
     /// [`TracedRows::new`](crate::backend::gpu::TracedRows::new) and [`RayRows::new`].
     pub fn rows_by(
         &self,

@@ -48,6 +48,7 @@ mod target;
 mod to_error;
 mod validator;
 
+pub use crate::progress::Timings;
 pub use error_estimate::{ErrorEstimate, GroupError};
 pub use outcome::{Obstacle, Outcome};
 pub use progress::BakeProgress;

@@ -8,7 +8,8 @@
 //! ```no_run
 //! use std::ops::ControlFlow;
 //!
-//! use radiosity::{Backend, BakeProgress, BakeTarget, load_obj, write_ply};
+//! use radiosity::bake::BakeProgress;
+//! use radiosity::{Backend, BakeTarget, load_obj, write_ply};
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let backend = Backend::gpu(None)?; // or Backend::Cpu
@@ -85,8 +86,8 @@
 //! - Lengths are in the scene's own unit. Radiosity does not depend on it; W are W/m² times that
 //!   unit squared.
 //! - A face's front is where its corners run counter-clockwise. The front reflects and emits, and
-//!   the back reflects if its material says so ([`Sides`]; in files, if light reaches it). Both
-//!   block, but for what is translucent or clear ([`Material`]); light that meets the back of
+//!   the back reflects if its material says so ([`scene::Sides`]; in files, if light reaches it).
+//!   Both block, but for what is translucent or clear ([`Material`]); light that meets the back of
 //!   others is lost there, and counted.
 //! - Shares of light are whole numbers of 1/[`Row::TOTAL`](form_factor::Row::TOTAL), so rows sum to
 //!   one exactly and a solve gives the same bits on every run with the same adapter.
@@ -132,16 +133,13 @@ mod visibility;
 pub use glam;
 
 pub use backend::Backend;
-pub use backend::cpu::RayRows;
 #[cfg(feature = "gpu")]
-pub use backend::gpu::{Gpu, HemicubeRows};
-pub use bake::{BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorEstimate};
-pub use bands::{BandLight, Bands};
-pub use camera::{Camera, RadianceImage};
+pub use backend::gpu::Gpu;
+pub use bake::{BakeResult, BakeSettings, BakeTarget};
+pub use camera::Camera;
 pub use error::{Error, ErrorKind};
 pub use form_factor::FormFactors;
 pub use gather::{Gather, GatheredMesh};
-pub use heat::HeatBalance;
 #[cfg(feature = "exr")]
 pub use io::write_exr;
 #[cfg(feature = "glb")]
@@ -150,11 +148,7 @@ pub use io::write_glb;
 pub use io::write_png;
 pub use io::{ObjSettings, load_obj, read_ply, write_ply};
 pub use mesh::Mesh;
-pub use progress::{StopReason, Timings};
-pub use scene::{
-    IntensityDistribution, Luminaire, Material, Rgb, Scene, Sides, Sky, SkyDistribution, Specular,
-    Sun, Triangle, Warning,
-};
+pub use scene::{Material, Rgb, Scene, Sky, Sun, Triangle};
 pub use solver::{Solution, Solver};
 pub use vertex::VertexMesh;
 pub use view_factor::ViewFactors;

@@ -40,7 +40,7 @@ mod step;
 use std::time::Duration;
 
 use crate::error::{Error, ErrorKind};
-use crate::progress::StopReason;
+pub use crate::progress::StopReason;
 use crate::scene::Rgb;
 pub(crate) use flux_state::ReceivedLight;
 pub use ledger::Ledger;

@@ -10,10 +10,11 @@ use std::time::Instant;
 
 use radiosity::backend::RowMaker;
 use radiosity::backend::cost::{self, RowCost};
-use radiosity::backend::gpu::TracedRows;
+use radiosity::backend::cpu::RayRows;
+use radiosity::backend::gpu::{HemicubeRows, TracedRows};
 use radiosity::form_factor::Row;
 use radiosity::mesh::NodeId;
-use radiosity::{BakeSettings, Error, FormFactors, Gpu, HemicubeRows, Mesh, RayRows, Scene};
+use radiosity::{BakeSettings, Error, FormFactors, Gpu, Mesh, Scene};
 
 use crate::common::scenes::cut_into_four;
 

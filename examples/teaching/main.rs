@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::{ProximityCorrection, Row};
 use radiosity::io::ToneCurve;
 use radiosity::mesh::NodeId;

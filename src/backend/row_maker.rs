@@ -10,7 +10,7 @@ pub enum RowMaker {
     Hemicubes,
     /// Rays on a graphics device: `gpu::TracedRows`.
     DeviceRays,
-    /// Rays on the CPU: [`RayRows`](crate::RayRows).
+    /// Rays on the CPU: [`RayRows`](crate::backend::cpu::RayRows).
     Rays,
 }
 

@@ -1,7 +1,7 @@
 //! The model of error and cost that controls a bake.
 //!
-//! The error of a bake is that of [`ErrorEstimate`](crate::ErrorEstimate). Its parts are treated as
-//! independent: their squares add up. Each follows one setting:
+//! The error of a bake is that of [`ErrorEstimate`](crate::bake::ErrorEstimate). Its parts are
+//! treated as independent: their squares add up. Each follows one setting:
 //!
 //! | part | follows | as | cost |
 //! |---|---|---|---|

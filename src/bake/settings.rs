@@ -152,8 +152,8 @@ impl BakeSettings {
     }
 
     /// Initial settings for vertices of `scene` to have the error `error`
-    /// ([`ErrorEstimate`](crate::ErrorEstimate), a share, clamped to 1e-4 to 0.3), by power laws
-    /// that were chosen so that most bakes need few rounds of refinement.
+    /// ([`ErrorEstimate`](crate::bake::ErrorEstimate), a share, clamped to 1e-4 to 0.3), by power
+    /// laws that were chosen so that most bakes need few rounds of refinement.
     ///
     /// The light is surveyed at 512 points first, with rays on the CPU: lengths are shares of the
     /// diagonal of the region that has the light, and lights that mostly miss are gathered.

@@ -31,7 +31,7 @@ use crate::visibility::lit_sides;
 #[non_exhaustive]
 pub enum BakeTarget {
     /// Root mean square error of the reflected radiosity over the area, as a share of it, in (0,
-    /// 1): [`ErrorEstimate`](crate::ErrorEstimate) has the definition. The bake ends when the
+    /// 1): [`ErrorEstimate`](crate::bake::ErrorEstimate) has the definition. The bake ends when the
     /// estimated error is well below, or where it will not fall any further: see
     /// [`BakeResult::outcome`].
     Error(f64),

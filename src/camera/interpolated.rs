@@ -15,12 +15,12 @@ use crate::scene::Rgb;
 impl Camera {
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
     /// hits a textured material, the irradiance between the vertices is reflected by the texture at
-    /// that point. Mirrors and glass ([`crate::Specular`]) are followed: a ray goes on, and splits
-    /// at glass, until it hits a diffuse surface or the sky. Branches that together weigh less than
-    /// 1/1024 of the ray are dropped, as are those behind 512 boundaries, for example between two
-    /// parallel mirrors: they count as the mean of the others. `progress` is called with the number
-    /// of pixels done and of all pixels, several times a second. It may stop the work; the result
-    /// is `None` then.
+    /// that point. Mirrors and glass ([`crate::scene::Specular`]) are followed: a ray goes on, and
+    /// splits at glass, until it hits a diffuse surface or the sky. Branches that together weigh
+    /// less than 1/1024 of the ray are dropped, as are those behind 512 boundaries, for example
+    /// between two parallel mirrors: they count as the mean of the others. `progress` is called
+    /// with the number of pixels done and of all pixels, several times a second. It may stop the
+    /// work; the result is `None` then.
     ///
     /// # Errors
     /// Those of [`Camera::check`].

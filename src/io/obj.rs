@@ -44,8 +44,8 @@ use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 /// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
 /// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
 /// [`crate::Material::DEFAULT_REFLECTANCE`]. `illum` 3 to 7 and 9 make mirrors and glass
-/// ([`crate::Specular`]), which pictures show; the light solution treats mirrors as their diffuse
-/// part alone, and passes glass straight on, attenuated by its transmittance
+/// ([`crate::scene::Specular`]), which pictures show; the light solution treats mirrors as their
+/// diffuse part alone, and passes glass straight on, attenuated by its transmittance
 /// ([`ObjSettings::specular`]).
 ///
 /// Defects are repaired, and reported in [`Scene::warnings`]: libraries under other names or

@@ -47,7 +47,8 @@ struct ShownPoint {
 impl LightMap {
     /// Error of the map's values, between texels too, and its standard error: the root mean square
     /// over the reflecting surfaces of relative errors, with the measure of
-    /// [`ErrorEstimate`](crate::ErrorEstimate). `baked` is the bake that the map was gathered from.
+    /// [`ErrorEstimate`](crate::bake::ErrorEstimate). `baked` is the bake that the map was gathered
+    /// from.
     ///
     /// `progress` is called with the number of points done and of all points, several times a
     /// second; if it stops the work, the result is `None`, as it is if nothing reflects.

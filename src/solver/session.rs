@@ -24,6 +24,8 @@ use crate::progress::StopReason;
 /// device failure it is in the state before the batch, and continues with another device.
 ///
 /// ```
+/// # use radiosity::backend::cpu::RayRows;
+/// # use radiosity::solver::StopReason;
 /// # use radiosity::*;
 /// # use std::ops::ControlFlow;
 /// # fn main() -> Result<(), Error> {

@@ -1,17 +1,18 @@
 //! What holds of the public types whatever is in them.
 
 use radiosity::backend::cost::RowCost;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::{GpuLimits, TracedGather, TracedRows};
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{GpuLimits, HemicubeRows, TracedGather, TracedRows};
 use radiosity::backend::{AdapterInfo, BackendRows, RowMaker};
-use radiosity::bake::{GatherSettings, SolveSettings};
+use radiosity::bake::{BakeProgress, ErrorEstimate, GatherSettings, SolveSettings, Timings};
+use radiosity::camera::RadianceImage;
 use radiosity::form_factor::{Entry, ProximityCorrection, Row};
 use radiosity::gather::{
     GatherPoint, IrradianceSample, Progress as GatherProgress, RadiosityField, RefinementSettings,
 };
 use radiosity::io::ToneCurve;
 use radiosity::mesh::NodeId;
-use radiosity::solver::{Ledger, Method, Progress, SolveSession};
+use radiosity::solver::{Ledger, Method, Progress, SolveSession, StopReason};
 use radiosity::view_factor::{
     EnforcementReport, ErrorStats, Estimate, Factor, MatrixChecks, Missing,
 };

@@ -3,15 +3,15 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::TracedRows;
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{HemicubeRows, TracedRows};
 use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
+use radiosity::scene::Sides;
 use radiosity::verify::PathTracer;
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, FormFactors, Gather, HemicubeRows, Mesh, ObjSettings, RayRows,
-    Rgb, Scene, Sides, Sky, Sun,
+    Backend, BakeTarget, ErrorKind, FormFactors, Gather, Mesh, ObjSettings, Rgb, Scene, Sky, Sun,
 };
 
 use crate::common::changes::same_rays;

@@ -3,12 +3,11 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::{TracedGather, TracedRows};
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{HemicubeRows, TracedGather, TracedRows};
 use radiosity::mesh::NodeId;
 use radiosity::{
-    Backend, BakeTarget, Camera, FormFactors, Gather, GatheredMesh, HemicubeRows, Material, Mesh,
-    RayRows, Rgb, Scene,
+    Backend, BakeTarget, Camera, FormFactors, Gather, GatheredMesh, Material, Mesh, Rgb, Scene,
 };
 
 use crate::common::fakes::GivenRadiosity;

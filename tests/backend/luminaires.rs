@@ -6,9 +6,9 @@ use glam::DVec3;
 use radiosity::backend::gpu::TracedGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
-use radiosity::scene::Opening;
+use radiosity::scene::{IntensityDistribution, Luminaire, Opening};
 use radiosity::verify::PathTracer;
-use radiosity::{Backend, IntensityDistribution, Luminaire, Mesh, Rgb, Scene};
+use radiosity::{Backend, Mesh, Rgb, Scene};
 
 use crate::common::scenes::{Quad, facing_down, facing_up, paint, quads};
 use crate::common::{gpu, keep_counting};

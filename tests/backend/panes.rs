@@ -6,17 +6,18 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::TracedRows;
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{HemicubeRows, TracedRows};
 use radiosity::bake::Outcome;
 use radiosity::form_factor::Row;
 use radiosity::gather::{GatherPoint, RadiosityField};
 use radiosity::io::ToneCurve;
+use radiosity::scene::Specular;
 use radiosity::solver::Method;
 use radiosity::verify::{PathTracer, Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, FormFactors, Gather, HemicubeRows, Material, Mesh, RayRows,
-    Rgb, Scene, Solver, Specular, Sun, Triangle,
+    Backend, BakeTarget, ErrorKind, FormFactors, Gather, Material, Mesh, Rgb, Scene, Solver, Sun,
+    Triangle,
 };
 
 use crate::common::changes::{assert_balanced, by_elements, painted, same_rays, shifted};

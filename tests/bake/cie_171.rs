@@ -8,10 +8,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{Gather, GatherPoint};
-use radiosity::{
-    Backend, BakeSettings, BakeTarget, GatheredMesh, IntensityDistribution, Luminaire, Material,
-    Rgb, Scene, Sky, Sun,
-};
+use radiosity::scene::{IntensityDistribution, Luminaire};
+use radiosity::{Backend, BakeSettings, BakeTarget, GatheredMesh, Material, Rgb, Scene, Sky, Sun};
 
 use crate::common::keep_going;
 use crate::common::scenes::{Quad, block, facing_down, facing_up, paint, quads, walls};

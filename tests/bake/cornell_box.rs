@@ -1,6 +1,7 @@
 //! The Cornell box, from file to vertices, against path-traced truth.
 
-use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh};
+use radiosity::backend::cpu::RayRows;
+use radiosity::{Mesh, Solution, Solver, VertexMesh};
 
 use crate::common::{cornell_box, keep_going, truth};
 

@@ -4,12 +4,9 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::bake::Outcome;
-use radiosity::scene::Opening;
+use radiosity::scene::{IntensityDistribution, Luminaire, Opening};
 use radiosity::verify::{Settings, verify};
-use radiosity::{
-    Backend, BakeSettings, BakeTarget, Camera, IntensityDistribution, Luminaire, Material,
-    ObjSettings, Rgb, Sky,
-};
+use radiosity::{Backend, BakeSettings, BakeTarget, Camera, Material, ObjSettings, Rgb, Sky};
 
 use crate::common::scenes::{paint, quads, standing_block, walls};
 use crate::common::{cube, keep_going};

@@ -5,9 +5,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::DVec3;
-use radiosity::bake::{Obstacle, Outcome};
-use radiosity::verify;
-use radiosity::{Backend, BakeProgress, BakeSettings, BakeTarget, Material, Rgb, Scene, Triangle};
+use radiosity::bake::{BakeProgress, Obstacle, Outcome};
+use radiosity::{Backend, BakeSettings, BakeTarget, Material, Rgb, Scene, Triangle, verify};
 
 use crate::common::scenes::{facing_up, quads};
 use crate::common::{cornell_box, keep_going};

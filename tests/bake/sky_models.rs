@@ -6,10 +6,9 @@ use glam::DVec3;
 use radiosity::backend::gpu::TracedGather;
 use radiosity::bake::Outcome;
 use radiosity::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
+use radiosity::scene::SkyDistribution;
 use radiosity::verify::{PathTracer, Settings, verify};
-use radiosity::{
-    Backend, BakeTarget, Camera, ErrorKind, Mesh, Rgb, Scene, Sky, SkyDistribution, Sun,
-};
+use radiosity::{Backend, BakeTarget, Camera, ErrorKind, Mesh, Rgb, Scene, Sky, Sun};
 
 use crate::common::scenes::{Quad, facing_down, facing_up, paint, quads, standing_block};
 use crate::common::{gpu, keep_counting, keep_going};
@@ -236,7 +235,8 @@ fn a_bake_under_a_clear_sky_is_as_path_traced() {
 fn a_side_that_looks_below_the_horizon_is_dark() {
     let plate = facing_up([0.0, 1.0], [0.0, 1.0], 1.0);
     let doubled = |sky: Sky| {
-        let material = radiosity::Material { sides: radiosity::Sides::Auto, ..paint(0.5, 0.0) };
+        let material =
+            radiosity::Material { sides: radiosity::scene::Sides::Auto, ..paint(0.5, 0.0) };
         let scene = quads(&[(plate, material)]).with_sky(sky).unwrap();
         scene.resolve_sides().triangles().len() == 4
     };

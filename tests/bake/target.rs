@@ -4,11 +4,11 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use radiosity::bake::{Obstacle, Outcome};
+use radiosity::bake::{BakeProgress, Obstacle, Outcome};
 use radiosity::gather::RefinementSettings;
+use radiosity::solver::StopReason;
 use radiosity::{
-    Backend, BakeProgress, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material, Rgb, Scene,
-    Solver, StopReason,
+    Backend, BakeResult, BakeSettings, BakeTarget, ErrorKind, Material, Rgb, Scene, Solver,
 };
 
 use crate::common::{cornell_box, cube, keep_going, quads};

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::bake::Outcome;
+use radiosity::scene::SkyDistribution;
 use radiosity::verify::{PathTracer, Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, Camera, Material, ObjSettings, Rgb, Scene, Sky, SkyDistribution, Sun,
-    VertexMesh,
+    Backend, BakeTarget, Camera, Material, ObjSettings, Rgb, Scene, Sky, Sun, VertexMesh,
 };
 
 use crate::common::scenes::{Quad, facing_up, lamp, paint, quads, walls};

@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use radiosity::bands::{Band, BandMaterial};
-use radiosity::scene::IntensityDistribution;
-use radiosity::{Bands, Luminaire, Material};
+use radiosity::Material;
+use radiosity::bands::{Band, BandMaterial, Bands};
+use radiosity::scene::{IntensityDistribution, Luminaire};
 
 use super::{bake, glow, glowing, numbered};
 use crate::common::cube;

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use radiosity::bands::BandMaterial;
+use radiosity::bands::{BandMaterial, Bands};
 use radiosity::glam::DVec3;
-use radiosity::scene::IntensityDistribution;
-use radiosity::{Bands, Luminaire, Material, Rgb, Sky, Sun};
+use radiosity::scene::{IntensityDistribution, Luminaire};
+use radiosity::{Material, Rgb, Sky, Sun};
 
 use super::{bake, glow, glowing, largest, light, numbered};
 use crate::common::cube;

@@ -6,8 +6,8 @@ mod cornell_box;
 mod order;
 mod red_green_blue;
 
-use radiosity::bands::{Band, BandMaterial};
-use radiosity::{Backend, BakeResult, BakeSettings, BandLight, Bands, Material, Rgb, Scene};
+use radiosity::bands::{Band, BandLight, BandMaterial, Bands};
+use radiosity::{Backend, BakeResult, BakeSettings, Material, Rgb, Scene};
 
 use crate::common::{keep_counting, keep_going};
 

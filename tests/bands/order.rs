@@ -1,7 +1,7 @@
 //! A band is the same, to the last bit, in any order and whichever others there are.
 
-use radiosity::bands::BandMaterial;
-use radiosity::{BandLight, Bands, load_obj};
+use radiosity::bands::{BandLight, BandMaterial, Bands};
+use radiosity::load_obj;
 
 use super::{bake, light, numbered};
 

@@ -1,6 +1,7 @@
 //! Bands that are red, green and blue have the light of the bake itself.
 
-use radiosity::{Backend, BakeResult, BakeTarget, Bands, Rgb, Scene, load_obj};
+use radiosity::bands::Bands;
+use radiosity::{Backend, BakeResult, BakeTarget, Rgb, Scene, load_obj};
 
 use super::light;
 use crate::common::keep_going;

@@ -6,11 +6,10 @@ use std::time::Duration;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
+use radiosity::camera::RadianceImage;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
-use radiosity::{
-    Camera, Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, RadianceImage, Rgb,
-};
+use radiosity::{Camera, Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, Rgb};
 
 use crate::common::{keep_counting, quads};
 

@@ -1,7 +1,8 @@
 //! The camera image of a surface.
 
 use glam::DVec3;
-use radiosity::{Camera, ErrorKind, Material, Mesh, RayRows, Rgb, Solver, VertexMesh};
+use radiosity::backend::cpu::RayRows;
+use radiosity::{Camera, ErrorKind, Material, Mesh, Rgb, Solver, VertexMesh};
 
 use crate::common::{keep_going, quads};
 

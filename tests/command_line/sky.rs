@@ -164,7 +164,8 @@ fn a_picture_is_a_sky() {
     let folder = tempfile::tempdir().unwrap();
     // White above the horizon, as EXR; and as HDR, in which 1 is 128, 128, 128 and 2¹⁻⁸⁺¹²⁸.
     let pixels: Vec<Rgb> = [Rgb::ONE, Rgb::ZERO].into_iter().flat_map(|l| [l; 4]).collect();
-    let image = radiosity::RadianceImage { width: 4, height: 2, pixels, sky: vec![false; 8] };
+    let image =
+        radiosity::camera::RadianceImage { width: 4, height: 2, pixels, sky: vec![false; 8] };
     radiosity::write_exr(folder.path().join("half.exr"), &image).unwrap();
     let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
     hdr.extend([[128, 128, 128, 129]; 4].concat());

@@ -1,8 +1,9 @@
 //! Changes of a solved scene, and how far apart two solutions are.
 
 use glam::{DAffine3, DVec3};
+use radiosity::backend::cpu::RayRows;
 use radiosity::solver::Method;
-use radiosity::{Material, Mesh, RayRows, Rgb, Solution, Solver};
+use radiosity::{Material, Mesh, Rgb, Solution, Solver};
 
 /// Rays, as many for each row whatever light it carries: equal equations, however they are solved.
 pub fn same_rays(mesh: &Mesh) -> RayRows {

@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::Row;
 use radiosity::mesh::NodeId;
-use radiosity::{FormFactors, Gpu, HemicubeRows, Mesh};
+use radiosity::{FormFactors, Gpu, Mesh};
 
 /// Largest delta form factor of a hemicube of resolution `n`: the middle of the top face.
 pub fn largest_pixel(n: u32) -> f64 {

@@ -1,7 +1,8 @@
 //! How many rows are asked for at once: progress is reported between batches, so the work of one
 //! is bounded whatever the settings.
 
-use radiosity::{FormFactors, Mesh, RayRows};
+use radiosity::backend::cpu::RayRows;
+use radiosity::{FormFactors, Mesh};
 
 use crate::common::cube;
 use crate::common::scenes::grey;

@@ -1,8 +1,9 @@
 //! Effort follows the flux at stake: coarse rows for patches that shoot little.
 
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::{ProximityCorrection, Row};
 use radiosity::mesh::NodeId;
-use radiosity::{Error, FormFactors, Material, Mesh, RayRows, Rgb, Solution, Solver};
+use radiosity::{Error, FormFactors, Material, Mesh, Rgb, Solution, Solver};
 
 use crate::common::{cornell_box, keep_going, quads};
 

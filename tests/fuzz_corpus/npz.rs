@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::heat::{Boundary, HeatSettings, Surface};
+use radiosity::ErrorKind;
+use radiosity::heat::{Boundary, HeatBalance, HeatSettings, Surface};
 use radiosity::io::{npz_from_bytes, write_npz};
-use radiosity::{ErrorKind, HeatBalance};
 
 /// Reads a matrix of view factors, and if it is one, writes and reads it again, measures and
 /// enforces it, and lets heat flow. Answers whether it was taken; panics where a matrix or an error

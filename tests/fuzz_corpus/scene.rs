@@ -9,8 +9,9 @@
 //!
 //! An image of any kind is told by its content; what has no sign of its own is taken for a TGA.
 
+use radiosity::backend::cpu::RayRows;
 use radiosity::io::ObjSettings;
-use radiosity::{Error, ErrorKind, Mesh, RayRows, Rgb, Scene, Sky, Solver, VertexMesh};
+use radiosity::{Error, ErrorKind, Mesh, Rgb, Scene, Sky, Solver, VertexMesh};
 use std::ops::ControlFlow;
 
 /// Parts one file from the next.

@@ -7,8 +7,9 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
 use radiosity::solver::{Method, Progress, SolveSession};
-use radiosity::{ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solver, Triangle};
+use radiosity::{ErrorKind, FormFactors, Material, Mesh, Rgb, Scene, Solver, Triangle};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Steps, and batches, that a state which is taken goes on by.

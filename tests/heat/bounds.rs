@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use radiosity::heat::{HeatSettings, STEFAN_BOLTZMANN, Surface};
+use radiosity::heat::{HeatBalance, HeatSettings, STEFAN_BOLTZMANN, Surface};
 use radiosity::view_factor::Estimate;
-use radiosity::{ErrorKind, HeatBalance, ViewFactors};
+use radiosity::{ErrorKind, ViewFactors};
 
 use super::{assert_near, at, balance, matrix, with_flux};
 

@@ -4,9 +4,9 @@ mod closed_forms;
 
 use std::ops::ControlFlow;
 
-use radiosity::heat::{Boundary, HeatSettings, Surface};
+use radiosity::heat::{Boundary, HeatBalance, HeatSettings, Surface};
 use radiosity::view_factor::{Estimate, Factor, Missing};
-use radiosity::{Error, HeatBalance, ViewFactors};
+use radiosity::{Error, ViewFactors};
 
 /// A matrix of these areas and factors, which are exact; what rows lack is open.
 fn matrix(areas: &[f64], factors: &[&[f64]]) -> ViewFactors {

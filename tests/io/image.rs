@@ -1,7 +1,8 @@
 //! EXR and PNG files.
 
+use radiosity::camera::RadianceImage;
 use radiosity::io::ToneCurve;
-use radiosity::{ErrorKind, RadianceImage, Rgb, write_exr, write_png};
+use radiosity::{ErrorKind, Rgb, write_exr, write_png};
 
 /// 4 × 3 pixels, all different, red from 0 to 11 and green even.
 fn image() -> RadianceImage {

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use radiosity::io::SpecularSurfaces;
-use radiosity::scene::WarningKind;
-use radiosity::{ErrorKind, ObjSettings, Rgb, Specular};
+use radiosity::scene::{Specular, WarningKind};
+use radiosity::{ErrorKind, ObjSettings, Rgb};
 
 use super::obj_texts::{
     CHALK, SQUARE, load, load_strictly, obj, oddities, refused, repaired, warned, with_library,

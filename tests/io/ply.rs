@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
+use radiosity::camera::RadianceImage;
 use radiosity::io::{ToneCurve, write_ply_with_tone};
-use radiosity::{
-    ErrorKind, Material, Mesh, RadianceImage, Rgb, VertexMesh, write_exr, write_ply, write_png,
-};
+use radiosity::{ErrorKind, Material, Mesh, Rgb, VertexMesh, write_exr, write_ply, write_png};
 
 use crate::common::framed::{self, Frame, HERE};
 use crate::common::{cube, files};

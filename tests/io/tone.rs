@@ -1,7 +1,8 @@
 //! The tone curve: exposure from the median, highlights rolled off, sRGB.
 
+use radiosity::camera::RadianceImage;
 use radiosity::io::ToneCurve;
-use radiosity::{Camera, RadianceImage, Rgb};
+use radiosity::{Camera, Rgb};
 
 use crate::common::framed::{self, HERE};
 

@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 use radiosity::light_map::{Atlas, Coordinates, Resolution, Unusable};
-use radiosity::{ErrorKind, ObjSettings, Scene, Sides};
+use radiosity::scene::Sides;
+use radiosity::{ErrorKind, ObjSettings, Scene};
 
 use crate::common::cornell_box;
 

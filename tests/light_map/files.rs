@@ -8,7 +8,8 @@ use radiosity::io::{
     ToneCurve, write_light_map_exr, write_light_map_glb, write_light_map_radiosity,
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
-use radiosity::{ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb, Sides};
+use radiosity::scene::Sides;
+use radiosity::{ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb};
 
 use crate::common::keep_counting;
 

@@ -8,9 +8,9 @@ use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
+use radiosity::scene::Sides;
 use radiosity::{
-    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, ObjSettings, Rgb, Scene, Sides,
-    Triangle,
+    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, ObjSettings, Rgb, Scene, Triangle,
 };
 
 use crate::common::scenes::{facing_down, facing_up, grey, lamp, standing_block, walls};

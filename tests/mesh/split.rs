@@ -2,10 +2,10 @@
 //! term, which knows their areas. No GPU needed.
 
 use glam::{DQuat, DVec3};
+use radiosity::backend::cpu::RayRows;
 use radiosity::mesh::NodeId;
-use radiosity::{
-    ErrorKind, Material, Mesh, RayRows, Rgb, Scene, Solver, StopReason, Triangle, VertexMesh,
-};
+use radiosity::solver::StopReason;
+use radiosity::{ErrorKind, Material, Mesh, Rgb, Scene, Solver, Triangle, VertexMesh};
 
 use crate::common::closed_forms::exact;
 use crate::common::scenes::{grey, standing_block};

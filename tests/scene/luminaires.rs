@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
-use radiosity::scene::{Opening, Pole};
-use radiosity::{ErrorKind, IntensityDistribution, Luminaire, Rgb};
+use radiosity::scene::{IntensityDistribution, Luminaire, Opening, Pole};
+use radiosity::{ErrorKind, Rgb};
 
 use crate::common::cube;
 use crate::common::scenes::grey;

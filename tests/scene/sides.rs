@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::scene::WarningKind;
+use radiosity::scene::{Sides, WarningKind};
 use radiosity::{
-    Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, Sides, Sky, Sun, Triangle, VertexMesh,
+    Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, Sky, Sun, Triangle, VertexMesh,
     load_obj,
 };
 

@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::Row;
 use radiosity::mesh::NodeId;
-use radiosity::solver::{Method, Progress};
-use radiosity::{Error, ErrorKind, FormFactors, Mesh, RayRows, Solver, StopReason};
+use radiosity::solver::{Method, Progress, StopReason};
+use radiosity::{Error, ErrorKind, FormFactors, Mesh, Solver};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};

@@ -1,9 +1,10 @@
 //! Hemicubes of up to 1024 pixels against closed forms.
 
 use glam::DVec3;
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::mesh::NodeId;
-use radiosity::{HemicubeRows, Mesh, Rgb, Solver};
+use radiosity::{Mesh, Rgb, Solver};
 
 use crate::common::closed_forms::from_centroid;
 use crate::common::hemicubes::{factor_to_group, hemicube_rows, outline_bound};

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
+use radiosity::backend::cpu::RayRows;
 use radiosity::io::read_obj;
-use radiosity::{Mesh, RayRows, Solution, Solver, VertexMesh};
+use radiosity::{Mesh, Solution, Solver, VertexMesh};
 
 use crate::common::keep_going;
 

@@ -6,11 +6,9 @@ use glam::DVec3;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use radiosity::gather::{GatherPoint, RadiosityField};
+use radiosity::scene::{Sides, SkyDistribution, Specular};
 use radiosity::solver::Method;
-use radiosity::{
-    Backend, BakeSettings, Material, Mesh, Rgb, Scene, Sides, Sky, SkyDistribution, Solver,
-    Specular, Sun, Triangle,
-};
+use radiosity::{Backend, BakeSettings, Material, Mesh, Rgb, Scene, Sky, Solver, Sun, Triangle};
 
 use crate::common::changes::{by_elements, flux_difference, painted, same_rays};
 use crate::common::keep_going;

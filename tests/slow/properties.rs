@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::Row;
 use radiosity::solver::Method;
-use radiosity::{Material, Mesh, RayRows, Rgb, Scene, Solution, Solver, Triangle};
+use radiosity::{Material, Mesh, Rgb, Scene, Solution, Solver, Triangle};
 
 use crate::common::closed_forms::exact;
 use crate::common::fakes::StoredRows;

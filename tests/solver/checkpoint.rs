@@ -2,11 +2,10 @@
 //! the bits of one that was not. No GPU needed.
 
 use glam::{DAffine3, DVec3};
+use radiosity::backend::cpu::RayRows;
+use radiosity::scene::{IntensityDistribution, Luminaire, SkyDistribution};
 use radiosity::solver::Method;
-use radiosity::{
-    ErrorKind, IntensityDistribution, Luminaire, Mesh, RayRows, Rgb, Scene, Sky, SkyDistribution,
-    Solver, Sun,
-};
+use radiosity::{ErrorKind, Mesh, Rgb, Scene, Sky, Solver, Sun};
 
 use crate::common::measures::assert_same_bits;
 use crate::common::{cornell_box, keep_going};

@@ -2,10 +2,9 @@
 
 use radiosity::form_factor::{Entry, Row};
 use radiosity::mesh::NodeId;
-use radiosity::solver::Method;
-use radiosity::{
-    Error, FormFactors, Mesh, ObjSettings, Rgb, Scene, Sides, Solution, Solver, StopReason,
-};
+use radiosity::scene::Sides;
+use radiosity::solver::{Method, StopReason};
+use radiosity::{Error, FormFactors, Mesh, ObjSettings, Rgb, Scene, Solution, Solver};
 
 use crate::common::changes::{assert_balanced, by_elements, same_rays};
 use crate::common::cut_outs::{Lattice, Part, read};

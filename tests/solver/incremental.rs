@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use glam::{DAffine3, DVec3};
-use radiosity::solver::{Method, Progress, SolveSession};
-use radiosity::{ErrorKind, FormFactors, Material, Rgb, Solution, Solver, StopReason};
+use radiosity::solver::{Method, Progress, SolveSession, StopReason};
+use radiosity::{ErrorKind, FormFactors, Material, Rgb, Solution, Solver};
 
 use crate::common::changes::{
     assert_balanced, by_elements, flux_difference, painted, same_rays, shifted,

@@ -2,11 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::{Entry, Row};
-use radiosity::solver::Method;
-use radiosity::{
-    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver, StopReason,
-};
+use radiosity::solver::{Method, StopReason};
+use radiosity::{ErrorKind, FormFactors, Material, Mesh, Rgb, Scene, Solution, Solver};
 
 use crate::common::changes::by_elements;
 use crate::common::closed_forms::exact;

@@ -5,6 +5,7 @@
 //! energy alone, whatever the noise of the rays.
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
 use radiosity::solver::Ledger;
 use radiosity::*;
 

@@ -3,11 +3,12 @@
 use std::collections::HashSet;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::{Entry, Row};
 use radiosity::mesh::NodeId;
+use radiosity::solver::StopReason;
 use radiosity::{
-    Error, ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Scene, Solution, Solver,
-    StopReason, Triangle,
+    Error, ErrorKind, FormFactors, Material, Mesh, Rgb, Scene, Solution, Solver, Triangle,
 };
 
 use crate::common::scenes::lamp;

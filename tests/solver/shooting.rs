@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
 use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::polygon_to_polygon;
-use radiosity::{
-    ErrorKind, FormFactors, Material, Mesh, RayRows, Rgb, Solution, Solver, StopReason,
-};
+use radiosity::solver::StopReason;
+use radiosity::{ErrorKind, FormFactors, Material, Mesh, Rgb, Solution, Solver};
 
 use crate::common::closed_forms::exact;
 use crate::common::framed::{self, Frame};

@@ -9,10 +9,9 @@
 
 use radiosity::form_factor::{Entry, Row};
 use radiosity::mesh::NodeId;
-use radiosity::solver::Method;
-use radiosity::{
-    Error, FormFactors, Material, Mesh, Rgb, Scene, Sides, Solution, Solver, StopReason, Triangle,
-};
+use radiosity::scene::Sides;
+use radiosity::solver::{Method, StopReason};
+use radiosity::{Error, FormFactors, Material, Mesh, Rgb, Scene, Solution, Solver, Triangle};
 
 use crate::common::changes::{assert_balanced, by_elements, flux_difference, painted};
 use crate::common::keep_going;

@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use gltf::material::AlphaMode;
 use radiosity::backend::cpu::RayGather;
 use radiosity::io::ToneCurve;
-use radiosity::{Camera, GatheredMesh, Mesh, ObjSettings, Rgb, Scene, Sides, write_glb};
+use radiosity::scene::Sides;
+use radiosity::{Camera, GatheredMesh, Mesh, ObjSettings, Rgb, Scene, write_glb};
 
 use crate::common::cut_outs::{Lattice, Part, read};
 use crate::common::keep_counting;

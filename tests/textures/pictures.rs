@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::backend::cpu::RayGather;
-use radiosity::{Camera, GatheredMesh, Mesh, RadianceImage, Rgb};
+use radiosity::camera::RadianceImage;
+use radiosity::{Camera, GatheredMesh, Mesh, Rgb};
 
 use crate::common::keep_counting;
 use crate::common::textured::{GREEN, RED, box_with_wall, checkerboard, tga};

@@ -4,8 +4,9 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::DVec3;
+use radiosity::scene::Sides;
 use radiosity::verify::{Progress, Settings, Stop, Verification, Verifier, verify};
-use radiosity::{ErrorKind, Material, Rgb, Scene, Sides, Triangle, VertexMesh};
+use radiosity::{ErrorKind, Material, Rgb, Scene, Triangle, VertexMesh};
 
 use crate::common::keep_going;
 use crate::common::scenes::{

@@ -10,9 +10,8 @@ use radiosity::gather::{
     GatherPoint, IrradianceSample, Progress as GatherProgress, RadiosityField, RefinementSettings,
     gather_at_vertices,
 };
-use radiosity::{
-    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, Rgb, StopReason, VertexMesh,
-};
+use radiosity::solver::StopReason;
+use radiosity::{Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, Rgb, VertexMesh};
 
 use crate::common::scenes::{Quad, facing_down, facing_up, grey, lamp, standing_block};
 use crate::common::surface::{assert_watertight, assert_whole};

@@ -84,8 +84,8 @@ impl Gpu {
     /// Uses a device and queue of the caller's, within `limits`.
     ///
     /// No feature is required; with [`wgpu::Features::TIMESTAMP_QUERY`] the passes are timed
-    /// separately ([`crate::Timings`]). The limits of [`wgpu::Limits::default`], WebGPU's, are
-    /// sufficient; larger buffers and textures allow larger scenes and resolutions.
+    /// separately ([`crate::bake::Timings`]). The limits of [`wgpu::Limits::default`], WebGPU's,
+    /// are sufficient; larger buffers and textures allow larger scenes and resolutions.
     ///
     /// The caller's callbacks for uncaptured errors and for a lost device are kept. Errors of this
     /// crate's own calls are caught in error scopes, which belong to the calling thread, and

@@ -29,7 +29,8 @@ use crate::scene::Rgb;
 use crate::visibility::offset;
 
 /// Makes form-factor rows by casting cosine-distributed rays from a patch's centroid on a graphics
-/// device: the rows of [`RayRows`](crate::RayRows), except for rays that rounding deflects.
+/// device: the rows of [`RayRows`](crate::backend::cpu::RayRows), except for rays that rounding
+/// deflects.
 ///
 /// Every ray carries the same share of the light, so a form factor is a count: for n rays the
 /// standard error of an entry F is at most √(F(1−F)/n).
@@ -90,14 +91,14 @@ impl TracedRows {
             buffers,
             has_panes,
             slots,
-            full_share: crate::RayRows::FULL_SHARE,
+            full_share: crate::backend::cpu::RayRows::FULL_SHARE,
         };
         rows.add_directions(&samples, count)?;
         Ok(rows)
     }
 
     /// All rays for patches that shoot at least this share of the emitted flux, in [0, 1]: see
-    /// [`RayRows::with_full_share`](crate::RayRows::with_full_share).
+    /// [`RayRows::with_full_share`](crate::backend::cpu::RayRows::with_full_share).
     pub fn with_full_share(self, full_share: f64) -> TracedRows {
         TracedRows { full_share, ..self }
     }

@@ -7,7 +7,8 @@ use clap::Args;
 use radiosity::camera::up_axis;
 use radiosity::glam::DVec3;
 use radiosity::io::{Photometry, read_photometry};
-use radiosity::{Error, ErrorKind, Luminaire, Rgb, Scene};
+use radiosity::scene::Luminaire;
+use radiosity::{Error, ErrorKind, Rgb, Scene};
 use serde_json::{Value as Json, json};
 
 use crate::args::{self, Parsed, give};

@@ -22,7 +22,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use radiosity::BakeProgress;
+use radiosity::bake::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
 

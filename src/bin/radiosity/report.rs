@@ -4,9 +4,10 @@
 use std::time::Duration;
 
 use radiosity::backend::{AdapterInfo, RowMaker};
-use radiosity::bake::{GroupError, Obstacle, Outcome};
+use radiosity::bake::{ErrorEstimate, GroupError, Obstacle, Outcome};
+use radiosity::bands::BandLight;
 use radiosity::solver::Ledger;
-use radiosity::{BakeResult, BandLight, ErrorEstimate, Rgb};
+use radiosity::{BakeResult, Rgb};
 use serde_json::{Map, Value, json};
 
 use crate::bake::files::{Picture, camera_value};

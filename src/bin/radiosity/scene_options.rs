@@ -4,7 +4,8 @@ use std::path::Path;
 
 use clap::Args;
 use radiosity::io::SpecularSurfaces;
-use radiosity::{Error, ObjSettings, Rgb, Scene, Sides};
+use radiosity::scene::Sides;
+use radiosity::{Error, ObjSettings, Rgb, Scene};
 
 use crate::args::{Names, Parsed, give, one_of, rgb, value};
 use crate::luminaires::{LuminaireOptions, Luminaires};

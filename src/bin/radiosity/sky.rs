@@ -7,7 +7,8 @@ use clap::Args;
 use radiosity::camera::up_axis;
 use radiosity::glam::{DQuat, DVec3};
 use radiosity::io::read_radiance;
-use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, SkyDistribution, Sun};
+use radiosity::scene::SkyDistribution;
+use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, Sun};
 use solar_positioning::{Location, SolarPositions, delta_t};
 
 use crate::args::{self, Parsed, give};

@@ -12,9 +12,9 @@ use std::time::Instant;
 use clap::Args;
 use files::MatrixOptions;
 use radiosity::io::SpecularSurfaces;
-use radiosity::scene::WarningKind;
+use radiosity::scene::{Warning, WarningKind};
 use radiosity::view_factor::{ErrorStats, Estimate};
-use radiosity::{Error, ErrorKind, ObjSettings, Scene, ViewFactors, Warning};
+use radiosity::{Error, ErrorKind, ObjSettings, Scene, ViewFactors};
 
 use crate::args::{self, Stop, value};
 use crate::progress;

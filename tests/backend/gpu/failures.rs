@@ -6,20 +6,20 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::backend::Fallback;
-use radiosity::backend::cpu::RayGather;
-use radiosity::backend::gpu::{GpuLimits, TracedGather, TracedRows};
-use radiosity::bake::Outcome;
+use radiosity::backend::cpu::{RayGather, RayRows};
+use radiosity::backend::gpu::{GpuLimits, HemicubeRows, TracedGather, TracedRows};
+use radiosity::bake::{BakeProgress, Outcome};
 use radiosity::form_factor::Row;
 use radiosity::gather::{
     GatherPoint, IrradianceSample, RadiosityField, RefinementSettings, gather_at_vertices,
 };
 use radiosity::mesh::NodeId;
-use radiosity::solver::Method;
+use radiosity::scene::{Sides, SkyDistribution};
+use radiosity::solver::{Method, StopReason};
 use radiosity::verify::{Settings, verify};
 use radiosity::{
-    Backend, BakeProgress, BakeSettings, BakeTarget, Error, ErrorKind, FormFactors, Gather,
-    GatheredMesh, Gpu, HemicubeRows, Material, Mesh, RayRows, Rgb, Sides, Sky, SkyDistribution,
-    Solver, StopReason, Sun,
+    Backend, BakeSettings, BakeTarget, Error, ErrorKind, FormFactors, Gather, GatheredMesh, Gpu,
+    Material, Mesh, Rgb, Sky, Solver, Sun,
 };
 
 use crate::common::scenes::{Quad, facing_up, paint, quads, walls};

@@ -5,9 +5,8 @@ use glam::DVec3;
 use radiosity::backend::gpu::TracedGather;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
-use radiosity::{
-    ErrorKind, Gather, Gpu, Material, Mesh, Rgb, Scene, Sky, SkyDistribution, Sun, Triangle,
-};
+use radiosity::scene::SkyDistribution;
+use radiosity::{ErrorKind, Gather, Gpu, Material, Mesh, Rgb, Scene, Sky, Sun, Triangle};
 
 use crate::common::device_rays::{ROUNDING, Rays, same_as_on_the_cpu};
 use crate::common::fakes::GivenRadiosity;

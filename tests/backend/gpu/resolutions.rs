@@ -1,6 +1,7 @@
 //! Rows for little light are drawn at a lower resolution.
 
-use radiosity::{FormFactors, HemicubeRows};
+use radiosity::FormFactors;
+use radiosity::backend::gpu::HemicubeRows;
 
 use crate::common::{cornell_box, gpu};
 use crate::form_factor::resolution_policy::{FULL, SHARES, solve, some_elements};

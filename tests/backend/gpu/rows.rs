@@ -3,10 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use radiosity::backend::cpu::RayRows;
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::Row;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::mesh::NodeId;
-use radiosity::{ErrorKind, FormFactors, Gpu, HemicubeRows, Mesh, RayRows};
+use radiosity::{ErrorKind, FormFactors, Gpu, Mesh};
 
 use crate::common::hemicubes::{factor_to_group, hemicube_rows, largest_pixel, outline_bound};
 use crate::common::scenes::grey;

@@ -1,7 +1,8 @@
 //! Whole solves with rows from hemicubes: against closed forms and path-traced truth.
 
+use radiosity::backend::gpu::HemicubeRows;
 use radiosity::form_factor::ProximityCorrection;
-use radiosity::{HemicubeRows, Material, Mesh, Rgb, Solver};
+use radiosity::{Material, Mesh, Rgb, Solver};
 
 use crate::bake::cornell_box;
 use crate::common::scenes::{self};

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
-use radiosity::{Camera, Error, Gather, GatheredMesh, Material, Rgb, Specular};
+use radiosity::scene::Specular;
+use radiosity::{Camera, Error, Gather, GatheredMesh, Material, Rgb};
 
 use super::glass::{turned_inside_out, with_ball};
 use super::{LEFT_OUT, SIZE, block_of, draw, glass, lit, mirror, scene, tinted_glass};

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::{Camera, Material, Rgb, Sky, Specular};
+use radiosity::scene::Specular;
+use radiosity::{Camera, Material, Rgb, Sky};
 
 use super::{LEFT_OUT, directions, draw, lit, lit_walls, mirror, scene};
 use crate::common::scenes::{Quad, block, grey};

@@ -10,7 +10,9 @@ mod mirrors;
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::{Camera, GatheredMesh, Material, Mesh, RadianceImage, Rgb, Scene, Specular};
+use radiosity::camera::RadianceImage;
+use radiosity::scene::Specular;
+use radiosity::{Camera, GatheredMesh, Material, Mesh, Rgb, Scene};
 
 use crate::common::keep_counting;
 use crate::common::scenes::{Quad, block, quads};

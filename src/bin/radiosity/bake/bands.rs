@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use radiosity::bands::{Band, BandError, BandMaterial};
-use radiosity::{BakeResult, BandLight, Bands, Error, ErrorKind, Luminaire, Scene};
+use radiosity::bands::{Band, BandError, BandLight, BandMaterial, Bands};
+use radiosity::scene::Luminaire;
+use radiosity::{BakeResult, Error, ErrorKind, Scene};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

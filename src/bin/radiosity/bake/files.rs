@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use radiosity::bake::ErrorEstimate;
+use radiosity::bands::BandLight;
+use radiosity::camera::RadianceImage;
 use radiosity::glam::DVec3;
 use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
-    Backend, BakeResult, BandLight, Camera, Error, ErrorEstimate, ErrorKind, GatheredMesh,
-    RadianceImage, VertexMesh, write_exr, write_glb,
+    Backend, BakeResult, Camera, Error, ErrorKind, GatheredMesh, VertexMesh, write_exr, write_glb,
 };
 
 use crate::args::{self, List, Names, Parsed, give, numbers, some_of, value};
