@@ -27,7 +27,7 @@ use std::ops::ControlFlow;
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::ViewFactors;
 use exchange::Exchange;
-use surface::of_group;
+use surface::is_temperature;
 
 pub use balance::{GroupHeat, HeatBalance};
 pub use black_body::{STEFAN_BOLTZMANN, share_below};
@@ -65,7 +65,6 @@ fn check(
     let wrong = |place: &str, found: String, remedy: String| {
         Err(Error::new(ErrorKind::Setting, place, found, remedy))
     };
-    let is_temperature = |t: f64| t >= 0.0 && (STEFAN_BOLTZMANN * t.powi(4)).is_finite();
     let edges = &settings.band_edges;
     let ascend = edges.is_sorted_by(|a, b| a < b);
     if !ascend || !edges.iter().all(|&edge| edge > 0.0 && edge.is_finite()) {
@@ -80,31 +79,6 @@ fn check(
         let remedy = format!("the matrix has {} groups", factors.names.len());
         return wrong("surfaces", surfaces.len().to_string(), remedy);
     }
-    let bands = edges.len() + 1;
-    for (name, surface) in factors.names.iter().zip(surfaces) {
-        if surface.emissivity.len() != bands {
-            let found = format!("{} emissivities", surface.emissivity.len());
-            return Err(of_group(name, found, format!("one for each of the {bands} bands")));
-        }
-        if let Some(e) = surface.emissivity.iter().find(|e| !(0.0..=1.0).contains(*e)) {
-            return Err(of_group(name, format!("emissivity {e}"), "it must be in [0, 1]"));
-        }
-        let reflects_all = surface.emissivity.iter().all(|&e| e == 0.0);
-        match surface.boundary {
-            Boundary::Temperature(t) if !is_temperature(t) => {
-                let remedy = "it must be at least 0 K, and finite";
-                return Err(of_group(name, format!("temperature {t}"), remedy));
-            }
-            Boundary::NetFlux(q) if !q.is_finite() => {
-                return Err(of_group(name, format!("net flux {q}"), "it must be finite"));
-            }
-            Boundary::NetFlux(q) if q != 0.0 && reflects_all => {
-                let found = format!("net flux {q} with emissivity 0");
-                let remedy = "what neither emits nor absorbs has none: give it an emissivity";
-                return Err(of_group(name, found, remedy));
-            }
-            _ => {}
-        }
-    }
-    Ok(())
+    let mut groups = factors.names.iter().zip(surfaces);
+    groups.try_for_each(|(name, surface)| surface.check(name, edges.len() + 1))
 }

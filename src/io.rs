@@ -78,6 +78,11 @@ fn write_file(
     write(&mut out).and_then(|()| out.flush()).map_err(|e| cannot_write(path, e))
 }
 
+fn cannot_read(path: &Path, e: std::io::Error, remedy: &str) -> Error {
+    let found = format!("cannot be read: {e}");
+    Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
+}
+
 fn cannot_write(path: &Path, e: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
     let e = e.into();
     let found = format!("cannot be written: {e}");

@@ -1,5 +1,6 @@
 //! Properties of groups.
 
+use super::black_body::emission;
 use crate::error::{Error, ErrorKind, quoted};
 
 /// Boundary condition of a group.
@@ -29,6 +30,40 @@ pub struct HeatSettings {
     /// Temperature of the surroundings seen through the open parts of the enclosure, K; they are
     /// black.
     pub surroundings: f64,
+}
+
+impl Surface {
+    /// Whether every number of group `name` is in its range.
+    pub(super) fn check(&self, name: &str, bands: usize) -> Result<(), Error> {
+        if self.emissivity.len() != bands {
+            let found = format!("{} emissivities", self.emissivity.len());
+            return Err(of_group(name, found, format!("one for each of the {bands} bands")));
+        }
+        if let Some(e) = self.emissivity.iter().find(|e| !(0.0..=1.0).contains(*e)) {
+            return Err(of_group(name, format!("emissivity {e}"), "it must be in [0, 1]"));
+        }
+        let reflects_all = self.emissivity.iter().all(|&e| e == 0.0);
+        match self.boundary {
+            Boundary::Temperature(t) if !is_temperature(t) => {
+                let remedy = "it must be at least 0 K, and finite";
+                Err(of_group(name, format!("temperature {t}"), remedy))
+            }
+            Boundary::NetFlux(q) if !q.is_finite() => {
+                Err(of_group(name, format!("net flux {q}"), "it must be finite"))
+            }
+            Boundary::NetFlux(q) if q != 0.0 && reflects_all => {
+                let found = format!("net flux {q} with emissivity 0");
+                let remedy = "what neither emits nor absorbs has none: give it an emissivity";
+                Err(of_group(name, found, remedy))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a black body can have temperature `t`, K.
+pub(super) fn is_temperature(t: f64) -> bool {
+    t >= 0.0 && emission(t).is_finite()
 }
 
 /// The error for an invalid property of group `name`.

@@ -16,7 +16,7 @@ use npyz::WriterBuilder;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::write_file;
+use super::{cannot_read, write_file};
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, Factor, Missing, ViewFactors};
 
@@ -50,11 +50,10 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
         archive.add("data", count, factors().map(|f| f.value))?;
         archive.add("standard_error", count, factors().map(|f| f.error))?;
         archive.add("area", n as u64, matrix.areas.iter().copied())?;
-        for (name, error_name, shares) in
-            [("open", "open_error", &matrix.open), ("back", "back_error", &matrix.back)]
-        {
+        for (name, shares) in [("open", &matrix.open), ("back", &matrix.back)] {
+            let errors = shares.iter().map(|share| share.error);
             archive.add(name, n as u64, shares.iter().map(|share| share.value))?;
-            archive.add(error_name, n as u64, shares.iter().map(|share| share.error))?;
+            archive.add(&format!("{name}_error"), n as u64, errors)?;
         }
         archive.add("names", names.len() as u64, names.bytes())?;
         archive.add("absent", 1, std::iter::once(absent))?;
@@ -107,10 +106,7 @@ impl Archive<'_> {
 /// type or length, or has numbers that are not valid in a matrix of view factors.
 pub fn read_npz(path: impl AsRef<Path>) -> Result<ViewFactors, Error> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(|e| {
-        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
-        Error::new(ErrorKind::File, place, found, "give a readable .npz file").with_source(e)
-    })?;
+    let file = File::open(path).map_err(|e| cannot_read(path, e, "give a readable .npz file"))?;
     read(BufReader::new(file)).map_err(|e| e.inside(path))
 }
 
@@ -140,49 +136,18 @@ fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
     let count = row_starts[groups] as usize;
     let columns = arrays.integers("indices", Some(count))?;
     let values: Vec<f64> = arrays.numbers("data", Some(count))?;
-    let errors: Vec<f64> = arrays.numbers("standard_error", Some(count))?;
-    let areas: Vec<f64> = arrays.numbers("area", Some(groups))?;
-    let mut shares = |name: &str, error_name: &str| -> Result<Vec<Estimate>, Error> {
-        let values: Vec<f64> = arrays.numbers(name, Some(groups))?;
-        let errors: Vec<f64> = arrays.numbers(error_name, Some(groups))?;
-        check_range(name, &values, f64::is_finite, "finite")?;
-        check_range(error_name, &errors, is_size, "finite and at least 0")?;
-        let pairs = values.into_iter().zip(errors);
-        Ok(pairs.map(|(value, error)| Estimate { value, error }).collect())
-    };
-    let (open, back) = (shares("open", "open_error")?, shares("back", "back_error")?);
-    let names = match arrays.has("names") {
-        false => (1..=groups).map(|k| k.to_string()).collect(),
-        true => {
-            let bytes: Vec<u8> = arrays.numbers("names", None)?;
-            let text = String::from_utf8_lossy(&bytes);
-            let names: Vec<String> = text.split('\n').map(String::from).collect();
-            if names.len() != groups {
-                let remedy = format!("one a group, {groups}, with a line feed between");
-                return Err(wrong("names", format!("{} lines", names.len()), remedy));
-            }
-            names
-        }
-    };
-    let absent: Vec<u8> = match arrays.has("absent") {
-        false => vec![0],
-        true => arrays.numbers("absent", Some(1))?,
-    };
-    let absent = match absent[0] {
-        0 => Missing::Zero,
-        2 => Missing::Unmet,
-        other => return Err(wrong("absent", other.to_string(), "it is 0 or 2")),
-    };
-    check_range("data", &values, |value| value.is_finite() && value >= 0.0, "at least 0")?;
-    check_range("standard_error", &errors, is_size, "finite and at least 0")?;
-    check_range("area", &areas, is_size, "finite and at least 0")?;
+    let errors = arrays.sizes("standard_error", count)?;
+    let areas = arrays.sizes("area", groups)?;
+    let (open, back) = (arrays.shares("open", groups)?, arrays.shares("back", groups)?);
+    let (names, absent) = (arrays.names(groups)?, arrays.absent()?);
+    check_range("data", &values, is_size, "at least 0")?;
     let mut factors = Vec::with_capacity(groups);
     for row in row_starts.windows(2) {
         let row = row[0] as usize..row[1] as usize;
         let to = &columns[row.clone()];
         let is_group = |to: &i64| (0..groups as i64).contains(to);
         if !to.iter().all(is_group) || !to.is_sorted_by(|a, b| a < b) {
-            let found = format!("{} of row {}", "columns out of order or range", factors.len());
+            let found = format!("columns out of order or range of row {}", factors.len());
             return Err(wrong("indices", found, format!("ascending, from 0, below {groups}")));
         }
         let numbers = values[row.clone()].iter().zip(&errors[row]);
@@ -218,6 +183,48 @@ struct Arrays<'a, R> {
 impl<R: Read + Seek> Arrays<'_, R> {
     fn has(&self, name: &str) -> bool {
         self.archive.index_for_name(&format!("{name}.npy")).is_some()
+    }
+
+    /// The names of `groups`; without the array, their numbers from 1.
+    fn names(&mut self, groups: usize) -> Result<Vec<String>, Error> {
+        if !self.has("names") {
+            return Ok((1..=groups).map(|k| k.to_string()).collect());
+        }
+        let bytes: Vec<u8> = self.numbers("names", None)?;
+        let text = String::from_utf8_lossy(&bytes);
+        let names: Vec<String> = text.split('\n').map(String::from).collect();
+        if names.len() != groups {
+            let remedy = format!("one a group, {groups}, with a line feed between");
+            return Err(wrong("names", format!("{} lines", names.len()), remedy));
+        }
+        Ok(names)
+    }
+
+    fn absent(&mut self) -> Result<Missing, Error> {
+        let absent: Vec<u8> = match self.has("absent") {
+            false => vec![0],
+            true => self.numbers("absent", Some(1))?,
+        };
+        match absent[0] {
+            0 => Ok(Missing::Zero),
+            2 => Ok(Missing::Unmet),
+            other => Err(wrong("absent", other.to_string(), "it is 0 or 2")),
+        }
+    }
+
+    /// The array `name` of shares, and that of their errors.
+    fn shares(&mut self, name: &str, count: usize) -> Result<Vec<Estimate>, Error> {
+        let values: Vec<f64> = self.numbers(name, Some(count))?;
+        check_range(name, &values, f64::is_finite, "finite")?;
+        let pairs = values.into_iter().zip(self.sizes(&format!("{name}_error"), count)?);
+        Ok(pairs.map(|(value, error)| Estimate { value, error }).collect())
+    }
+
+    /// The array `name` of numbers that are finite and not negative.
+    fn sizes(&mut self, name: &str, count: usize) -> Result<Vec<f64>, Error> {
+        let sizes: Vec<f64> = self.numbers(name, Some(count))?;
+        check_range(name, &sizes, is_size, "finite and at least 0")?;
+        Ok(sizes)
     }
 
     /// Integers of 32 or 64 bits, as SciPy chooses.

@@ -15,6 +15,7 @@ use std::collections::HashSet;
 use std::io;
 use std::path::Path;
 
+use super::cannot_read;
 use super::files::{self, FileSource};
 use super::lights;
 use super::mtl::Library;
@@ -87,10 +88,7 @@ fn read_scene(
     files: &FileSource,
     settings: &ObjSettings,
 ) -> Result<Scene, Error> {
-    let bytes = bytes.map_err(|e| {
-        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
-        Error::new(ErrorKind::File, place, found, "give a readable OBJ file").with_source(e)
-    })?;
+    let bytes = bytes.map_err(|e| cannot_read(path, e, "give a readable OBJ file"))?;
     let mut repairs = Repairs::new(settings.strict);
     let (text, encoding) = match stl::is_stl(path) {
         true => stl::to_obj(path, bytes, &mut repairs)?,

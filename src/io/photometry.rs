@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::files;
-use crate::error::{Error, ErrorKind};
+use super::{cannot_read, files};
+use crate::error::Error;
 use crate::scene::{IntensityDistribution, Luminaire, Opening};
 
 /// The luminaire of a photometric file.
@@ -62,11 +62,8 @@ impl Photometry {
 pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
     let path = path.as_ref();
     // Five times the bytes of a file with 361 × 181 values.
-    let bytes = files::read_bytes(path, 1 << 22).map_err(|e| {
-        let remedy = "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file";
-        let found = format!("cannot be read: {e}");
-        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-    })?;
+    let bytes = files::read_bytes(path, 1 << 22)
+        .map_err(|e| cannot_read(path, e, "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file"))?;
     photometry_from_bytes(path, bytes)
 }
 

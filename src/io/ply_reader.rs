@@ -8,7 +8,7 @@ use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::files;
+use super::{cannot_read, files};
 use crate::error::{Error, ErrorKind, quoted, shortened};
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
@@ -44,11 +44,8 @@ const NAMES: [&str; 13] = [
 ///   a face has fewer than three vertices or one that does not exist.
 pub fn read_ply(path: impl AsRef<Path>) -> Result<VertexMesh, Error> {
     let path = path.as_ref();
-    let bytes = files::read_bytes(path, 1 << 32).map_err(|e| {
-        let remedy = "give a PLY file that can be read";
-        Error::new(ErrorKind::File, path.display().to_string(), e.to_string(), remedy)
-            .with_source(e)
-    })?;
+    let bytes = files::read_bytes(path, 1 << 32)
+        .map_err(|e| cannot_read(path, e, "give a PLY file that can be read"))?;
     parse(&bytes).map_err(|e| e.inside(path))
 }
 

@@ -13,8 +13,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{cannot_write, write_file};
-use crate::error::{Error, ErrorKind};
+use super::{cannot_read, cannot_write, write_file};
+use crate::error::Error;
 use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 
 /// Writes the matrix as CSV: a header row and a first column of names, rows emit, columns receive;
@@ -97,10 +97,7 @@ pub fn write_rows(path: impl AsRef<Path>, rows: &PartialMatrix) -> Result<(), Er
 /// [`crate::ErrorKind::File`] when the file cannot be read, has another format, or is damaged.
 pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|e| {
-        let (place, found) = (path.display().to_string(), format!("cannot be read: {e}"));
-        Error::new(ErrorKind::File, place, found, "give a readable file").with_source(e)
-    })?;
+    let bytes = std::fs::read(path).map_err(|e| cannot_read(path, e, "give a readable file"))?;
     PartialMatrix::from_bytes(&bytes).map_err(|e| e.inside(path))
 }
 

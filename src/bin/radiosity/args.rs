@@ -103,7 +103,9 @@ pub fn one_of<T: Copy + Send + Sync + 'static>(
 ) -> impl Fn(&str) -> Parsed<T> + Clone + Send + Sync + 'static {
     move |text| {
         let named = all.iter().find(|(name, _)| *name == text);
-        named.map(|(_, value)| *value).ok_or_else(|| give(&format!("one of {}", names(all))))
+        named
+            .map(|(_, value)| *value)
+            .ok_or_else(|| give(&format!("one of {}", names(all).join(", "))))
     }
 }
 
@@ -113,13 +115,14 @@ pub fn some_of<T: Copy + Send + Sync + 'static>(
 ) -> impl Fn(&str) -> Parsed<List<T>> + Clone + Send + Sync + 'static {
     move |text| {
         let values: Parsed<List<T>> = text.split(',').map(one_of(all)).collect();
-        let expected = || format!("some of {}, with commas between them", names(all));
+        let expected = || format!("some of {}, with commas between them", names(all).join(", "));
         values.map_err(|_| give(&expected()))
     }
 }
 
-fn names<T>(all: Names<T>) -> String {
-    all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+/// The names alone.
+pub fn names<T>(all: Names<T>) -> Vec<&'static str> {
+    all.iter().map(|(name, _)| *name).collect()
 }
 
 /// How a command ends whose results are written.
@@ -137,17 +140,54 @@ pub fn rgb(text: &str) -> Parsed<Rgb> {
     }
 }
 
+/// Where a command writes its files.
+#[derive(Args)]
+pub struct Output {
+    /// Path of the files without their endings, or a folder for files of the scene's name [default:
+    /// beside the scene]
+    #[arg(short, long, value_name = "STEM")]
+    out: Option<PathBuf>,
+    /// [`stem`] of it.
+    #[arg(skip)]
+    stem: PathBuf,
+}
+
+impl Output {
+    /// Names the files as `default` is where they are given no name, and checks whether they can be
+    /// written before any work is done for them.
+    ///
+    /// # Errors
+    /// Those of [`check_writable`].
+    pub fn name(&mut self, default: PathBuf, endings: &[&str]) -> Result<(), Error> {
+        self.stem = stem(self.out.take(), default, endings);
+        check_writable(&self.stem)
+    }
+
+    /// The file with this ending.
+    pub fn path(&self, ending: &str) -> PathBuf {
+        self.stem.with_added_extension(ending)
+    }
+
+    /// Writes the file with this ending.
+    ///
+    /// # Errors
+    /// Those of [`write_file`].
+    pub fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
+        progress::of_writing(&self.path(ending), |path| write_file(path, bytes))
+    }
+}
+
 /// The path of the files without their endings, of `--out`: in a folder, one that exists or that
 /// ends in a separator, they are named as `default` is; an ending that a format is named after is
 /// not repeated.
-pub fn stem<F>(out: Option<PathBuf>, default: PathBuf, formats: &[(&str, F)]) -> PathBuf {
+pub fn stem(out: Option<PathBuf>, default: PathBuf, endings: &[&str]) -> PathBuf {
     let Some(mut out) = out else { return default };
     let is_folder = out.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
     if is_folder || out.is_dir() {
         return out.join(default.file_name().unwrap_or_default());
     }
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-    if ending.is_some_and(|ending| formats.iter().any(|(name, _)| *name == ending)) {
+    if ending.is_some_and(|ending| endings.contains(&&*ending)) {
         out.set_extension("");
     }
     out
@@ -241,10 +281,10 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     })
 }
 
-/// A CSV file of rows of one length, the first of them the names of the columns.
-pub fn csv(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
+/// A CSV file: the names of the columns, with commas between them, and rows of as many cells.
+pub fn csv(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(vec![]);
-    for row in rows {
+    for row in std::iter::once(head.split(',').map(String::from).collect()).chain(rows) {
         table.write_record(row).expect("rows of one length");
     }
     table.into_inner().expect("a vector takes all bytes")

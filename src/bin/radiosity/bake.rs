@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use files::Files;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, Solver};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky};
 use settings::Adjustment;
 
 use crate::args::{self, DeviceOptions, MeasureOptions, Parsed, SHARE, Stop, give, value};
+use crate::light::warn_of_failure;
 use crate::report::Report;
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
@@ -138,50 +139,22 @@ impl Bake {
     /// From the scene file to all files that are asked for.
     fn bake_file(mut self, path: &Path) -> Result<Report, Error> {
         let start = Instant::now();
-        self.files.name_after(path);
-        self.files.check()?;
+        self.files.name_after(path)?;
         let Input { scene, luminaires, mut warnings } = self.reading.read(path)?;
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;
         let triangles = scene.triangles().len();
-        let load = start.elapsed().as_secs_f64();
         let opening = Instant::now();
         let device = self.device.open()?;
-        let open = opening.elapsed().as_secs_f64();
-        let unshot_goal = Cell::new(Solver::default().unshot);
+        let baking = Instant::now();
         interrupt::catch();
-        let mut baked = progress::of_bake(
-            || unshot_goal.get(),
-            |report| self.bake(scene, &device, &unshot_goal, report),
-        )?;
-        let band_light = match &bands {
-            Some(bands) => bands::light(bands, &baked)?,
-            None => None,
-        };
+        let mut baked = progress::of_bake(|unshot_goal, report| {
+            self.bake(scene, &device, unshot_goal, report)
+        })?;
+        let band_light = bands::light(bands.as_ref(), &baked)?;
         let stopped = interrupt::stopped();
-        if let Some(error) = &baked.device_failure {
-            warnings.push(format!("rays on the CPU took the place of the device: {error}"));
-            warnings.last().iter().for_each(|warning| eprintln!("warning: {warning}"));
-        }
-        if baked.light.surface.radiosity.iter().all(|&b| b == Rgb::ZERO) {
-            let scene = baked.mesh.scene();
-            let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
-            let is_black = !(0..scene.triangles().len()).any(reflects);
-            eprintln!(
-                "warning: {}",
-                match is_black {
-                    true => {
-                        "no surface reflects or emits anything: give materials a `Kd`, or --emit \
-                         MATERIAL=r,g,b"
-                    }
-                    false => {
-                        "no light reaches any surface: nothing emits, and no opening lets a sky \
-                         in; name a material that emits with --emit MATERIAL=r,g,b, or look at \
-                         which way surfaces face"
-                    }
-                }
-            );
-        }
+        warnings.extend(warn_of_failure(&baked));
+        warn_of_darkness(&baked);
         let sky = self.reading.sky.words(baked.mesh.scene());
         if self.reading.sky.is_default() {
             // White things would not be seen before the sky that was chosen to light them.
@@ -200,8 +173,8 @@ impl Bake {
             target: self.target(),
             limit: self.limit(),
             triangles,
-            load,
-            open,
+            load: (opening - start).as_secs_f64(),
+            open: (baking - opening).as_secs_f64(),
             write: writing.elapsed().as_secs_f64(),
             total: start.elapsed().as_secs_f64(),
             warnings,
@@ -247,6 +220,29 @@ impl Bake {
         };
         target.bake_with(scene, device, overrides, progress)
     }
+}
+
+/// Prints why all is dark, if it is.
+fn warn_of_darkness(baked: &BakeResult) {
+    if baked.light.surface.radiosity.iter().any(|&b| b != Rgb::ZERO) {
+        return;
+    }
+    let scene = baked.mesh.scene();
+    let reflects = |t: usize| scene.material(t).reflectance != Rgb::ZERO;
+    eprintln!(
+        "warning: {}",
+        match (0..scene.triangles().len()).any(reflects) {
+            true => {
+                "no light reaches any surface: nothing emits, and no opening lets a sky in; name \
+                 a material that emits with --emit MATERIAL=r,g,b, or look at which way surfaces \
+                 face"
+            }
+            false => {
+                "no surface reflects or emits anything: give materials a `Kd`, or --emit \
+                 MATERIAL=r,g,b"
+            }
+        }
+    );
 }
 
 /// Seconds above 0.

@@ -3,7 +3,7 @@
 mod picture;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use picture::{Picture, three_digits};
@@ -14,9 +14,9 @@ use radiosity::grid::{
 };
 use radiosity::{Error, ErrorKind, Scene};
 
-use crate::args::{self, Parsed, Stop, numbers, value};
+use crate::args::{self, Output, Parsed, Stop, numbers, value};
 use crate::light::{Light, LightOptions};
-use crate::{interrupt, progress};
+use crate::progress;
 
 /// A length for people.
 const METRES: &str = "a length in metres";
@@ -57,14 +57,10 @@ pub struct Options {
     /// 0.7152 of g and 0.0722 of b. Without it: irradiance, W/m², the mean of the channels
     #[arg(long)]
     photometric: bool,
-    /// Path of the files without their endings, or a folder for files of the scene's name [default:
-    /// the scene without its ending]
-    #[arg(short, long, value_name = "STEM")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
     #[command(flatten)]
     light: LightOptions,
-    #[arg(skip)]
-    stem: PathBuf,
 }
 
 /// A corner and two edges.
@@ -80,9 +76,7 @@ type Placed = (String, MeasuringGrid);
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        let formats = [("csv", ()), ("png", ())];
-        self.stem = args::stem(self.out.take(), self.scene.with_extension(""), &formats);
-        args::check_writable(&self.file(".csv"))?;
+        self.output.name(self.scene.with_extension(""), &["csv", "png"])?;
         let scene = self.light.scene(&self.scene)?;
         // Before the bake, which may take minutes.
         let grids = self.grids(&scene)?;
@@ -95,13 +89,6 @@ impl Options {
 
     fn quantity(&self) -> Quantity {
         if self.photometric { Quantity::Illuminance } else { Quantity::Irradiance }
-    }
-
-    /// The file that ends so.
-    fn file(&self, ending: &str) -> PathBuf {
-        let mut name = self.stem.clone().into_os_string();
-        name.push(format!(".grid{ending}"));
-        name.into()
     }
 
     fn settings(&self, strip: f64) -> GridSettings {
@@ -141,14 +128,9 @@ impl Options {
     fn measure(&self, grids: &[Placed], light: &Light) -> Result<Option<Vec<MeasuredGrid>>, Error> {
         let lit = &light.baked.light;
         let mut gatherer = light.device.gather_to_noise(lit, self.light.noise())?;
-        progress::of_count("points", |report| {
-            let measure = |(_, grid): &Placed| {
-                let measured = grid.measure(lit, &mut *gatherer, |done, of| {
-                    report(done, of)?;
-                    interrupt::flow()
-                });
-                measured.transpose()
-            };
+        progress::of_stoppable("points", |report| {
+            let measure =
+                |(_, grid): &Placed| grid.measure(lit, &mut *gatherer, &mut *report).transpose();
             let measured: Option<Result<Vec<MeasuredGrid>, Error>> =
                 grids.iter().map(measure).collect();
             measured.transpose()
@@ -164,29 +146,14 @@ impl Options {
             };
             say!("{}", self.line(&name, measured, &statistics));
             let number = if grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
-            self.draw(measured, &statistics, place, &self.file(&format!("{number}.png")))?;
-        }
-        progress::of_writing(&self.file(".csv"), |path| {
-            args::write_file(path, &table::csv(measured, self.quantity()))
-        })
-    }
-
-    fn draw(
-        &self,
-        measured: &MeasuredGrid,
-        statistics: &GridStatistics,
-        place: &str,
-        file: &Path,
-    ) -> Result<(), Error> {
-        let (quantity, metre) = (self.quantity(), self.metre);
-        let picture = Picture { measured, statistics, quantity, place, metre };
-        progress::of_writing(file, |path| {
+            let (quantity, metre) = (self.quantity(), self.metre);
+            let picture = Picture { measured, statistics: &statistics, quantity, place, metre };
             let png = picture.png().map_err(|found| {
-                let place = path.display().to_string();
-                Error::new(ErrorKind::File, place, found, "please report it")
+                Error::new(ErrorKind::File, "the picture of a grid", found, "please report it")
             })?;
-            args::write_file(path, &png)
-        })
+            self.output.write(&format!("grid{number}.png"), &png)?;
+        }
+        self.output.write("grid.csv", &table::csv(measured, self.quantity()))
     }
 
     fn line(&self, name: &str, measured: &MeasuredGrid, statistics: &GridStatistics) -> String {

@@ -72,7 +72,7 @@ impl Options {
     /// Runs the command.
     pub fn run(self) -> Result<(), Stop> {
         let default = self.input.with_extension("heat.csv");
-        let out = args::stem::<()>(self.out.clone(), default, &[]);
+        let out = args::stem(self.out.clone(), default, &[]);
         args::check_writable(&out)?;
         let source = self.source()?;
         let band_edges = self.bands.clone().unwrap_or_default();
@@ -132,8 +132,7 @@ fn print_balance(matrix: &ViewFactors, balance: &HeatBalance) {
 
 /// Writes a line a group.
 fn write(path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(), Error> {
-    let names = "group area temperature radiosity irradiance net_flux standard_error".split(' ');
-    let head = names.map(String::from).collect();
+    let head = "group,area,temperature,radiosity,irradiance,net_flux,standard_error";
     let groups = matrix.names.iter().zip(&matrix.areas).zip(&balance.groups);
     let lines = groups.map(|((name, area), group)| {
         let temperature = group.temperature.map_or(String::new(), |t| t.to_string());
@@ -142,5 +141,5 @@ fn write(path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(),
         let start = [name.clone(), area.to_string(), temperature];
         start.into_iter().chain(numbers.map(|number| number.to_string())).collect()
     });
-    args::write_file(path, &args::csv(std::iter::once(head).chain(lines)))
+    args::write_file(path, &args::csv(head, lines))
 }

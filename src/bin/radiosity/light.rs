@@ -1,10 +1,9 @@
 //! The light of a scene for commands that measure in it: how far it is baked, and by what.
 
-use std::cell::Cell;
 use std::path::Path;
 
 use clap::Args;
-use radiosity::{Backend, BakeResult, BakeTarget, Error, Scene, Solver};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene};
 
 use crate::args::{DeviceOptions, SHARE, value};
 use crate::scene_options::{Input, SceneOptions};
@@ -52,22 +51,19 @@ impl LightOptions {
         // than the next: errors of vertices are averaged over all that a point sees. Light that is
         // missed altogether is not averaged; hence 0.3 at most. Plain choice.
         let error = (3.0 * self.error).min(self.error.max(0.3));
-        let unshot = Cell::new(Solver::default().unshot);
-        let baked = progress::of_bake(
-            || unshot.get(),
-            |report| {
-                let look = |settings: &mut radiosity::BakeSettings| {
-                    unshot.set(settings.solve.solver.unshot);
-                };
-                BakeTarget::Error(error).bake_with(scene, &device, look, report)
-            },
-        )?;
-        match &baked.device_failure {
-            Some(error) => {
-                eprintln!("warning: rays on the CPU took the place of the device: {error}");
-                Ok(Light { baked, device: Backend::Cpu })
-            }
-            None => Ok(Light { baked, device }),
-        }
+        let baked = progress::of_bake(|unshot_goal, report| {
+            let look = |settings: &mut BakeSettings| unshot_goal.set(settings.solve.solver.unshot);
+            BakeTarget::Error(error).bake_with(scene, &device, look, report)
+        })?;
+        let device = if warn_of_failure(&baked).is_some() { Backend::Cpu } else { device };
+        Ok(Light { baked, device })
     }
+}
+
+/// Prints the warning that rays on the CPU took the place of the device, if they did.
+pub fn warn_of_failure(baked: &BakeResult) -> Option<String> {
+    let error = baked.device_failure.as_ref()?;
+    let warning = format!("rays on the CPU took the place of the device: {error}");
+    eprintln!("warning: {warning}");
+    Some(warning)
 }

@@ -1,7 +1,7 @@
 //! `radiosity light-map`: the irradiance of a scene's surfaces in a texture.
 
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,7 +15,7 @@ use radiosity::verify::Estimate;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorKind, Scene};
 
 use crate::args::{
-    self, DeviceOptions, List, MeasureOptions, Names, SHARE, Stop, one_of, some_of, value,
+    self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
 };
 use crate::bake::files::{SAMPLES, camera};
 use crate::scene_options::{Input, SceneOptions};
@@ -48,7 +48,8 @@ const COORDINATES: Names<Coordinates> =
 Writes STEM.exr, irradiance in W/m² and which texels gathered, and STEM.glb, the scene with its \
 coordinates in the map as TEXCOORD_1 and the map's radiosity as an image. Surfaces that reflect on \
 both sides have texels for each; --sides front makes them one-sided. Ctrl-C stops the command, \
-which then writes a map of fewer texels where one is done.")]
+which then writes a map of fewer texels where one is done. STEM is the scene's path with .light-map \
+as its ending unless --out gives another.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
@@ -76,10 +77,8 @@ pub struct Options {
     /// Write STEM.radiosity.exr: what surfaces emit and reflect, without textures
     #[arg(long)]
     radiosity: bool,
-    /// Path of the files without their endings, or a folder for files of the scene's name [default:
-    /// the scene with .light-map as its ending]
-    #[arg(short, long, value_name = "STEM")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
     /// Files: exr; glb; ply, the scene cut to texels with the light of the map, for `radiosity
     /// verify`; png, a picture of that
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
@@ -95,8 +94,6 @@ pub struct Options {
     reading: SceneOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    #[arg(skip)]
-    stem: PathBuf,
 }
 
 /// An error, in words.
@@ -108,12 +105,8 @@ fn said(shown: &Estimate) -> String {
 /// The light of a bake at the texels of `atlas`, unless Ctrl-C stopped either.
 fn gather(atlas: Atlas, baked: &BakeResult, device: &Backend) -> Result<LightMap, Stop> {
     args::end()?;
-    let map = progress::of_count("texels", |report| {
-        LightMap::of_bake(atlas, baked, device, |done, of| {
-            _ = report(done, of);
-            interrupt::flow()
-        })
-    })?;
+    let map =
+        progress::of_stoppable("texels", |report| LightMap::of_bake(atlas, baked, device, report))?;
     map.ok_or(Stop::Interrupted)
 }
 
@@ -143,12 +136,11 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        let default = self.scene.with_extension("light-map");
-        self.stem = args::stem(self.out.take(), default, FORMATS);
         if let Some(camera) = &self.camera {
             camera.check(PICTURE.0, PICTURE.1, SAMPLES)?;
         }
-        args::check_writable(&self.stem)?;
+        let endings = args::names(FORMATS);
+        self.output.name(self.scene.with_extension("light-map"), &endings)?;
         let start = Instant::now();
         self.reading.texture_coordinates = true;
         let Input { scene, .. } = self.reading.read(&self.scene)?;
@@ -158,8 +150,7 @@ impl Options {
         let device = self.device.open()?;
         let open = start.elapsed().as_secs_f64();
         interrupt::catch();
-        let goal = || 1e-4;
-        let baked = progress::of_bake(goal, |report| {
+        let baked = progress::of_bake(|_, report| {
             let measure = |settings: &mut BakeSettings| settings.measure = self.measure.measure();
             self.target().bake_with(atlas.scene().clone(), &device, measure, report)
         })?;
@@ -274,11 +265,8 @@ impl Options {
         device: &Backend,
     ) -> Result<Option<Estimate>, Stop> {
         args::end()?;
-        let shown = progress::of_count("points to measure the map", |report| {
-            map.shown_error(baked, device, |done, of| {
-                _ = report(done, of);
-                interrupt::flow()
-            })
+        let shown = progress::of_stoppable("points to measure the map", |report| {
+            map.shown_error(baked, device, report)
         })?;
         args::end()?;
         Ok(shown)
@@ -301,31 +289,26 @@ impl Options {
         }
     }
 
-    fn path(&self, ending: &str) -> PathBuf {
-        self.stem.with_added_extension(ending)
-    }
-
     fn write(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {
         let writes = |format: Format| self.formats.contains(&format);
+        let path = |ending: &str| self.output.path(ending);
         let tone = ToneCurve::fit(&baked.light.surface.radiosity);
         if writes(Format::Exr) {
-            progress::of_writing(&self.path("exr"), |path| write_light_map_exr(path, map))?;
+            progress::of_writing(&path("exr"), |path| write_light_map_exr(path, map))?;
         }
         if self.radiosity {
-            let path = self.path("radiosity.exr");
-            progress::of_writing(&path, |path| write_light_map_radiosity(path, map))?;
+            let write = |path: &Path| write_light_map_radiosity(path, map);
+            progress::of_writing(&path("radiosity.exr"), write)?;
         }
         if writes(Format::Glb) {
-            progress::of_writing(&self.path("glb"), |path| write_light_map_glb(path, map, &tone))?;
+            progress::of_writing(&path("glb"), |path| write_light_map_glb(path, map, &tone))?;
         }
         if !writes(Format::Ply) && !writes(Format::Png) {
             return Ok(());
         }
         let surface = progress::of_stage("cutting the scene to texels", || map.surface())?;
         if writes(Format::Ply) {
-            progress::of_writing(&self.path("ply"), |path| {
-                write_ply_with_tone(path, &surface, &tone)
-            })?;
+            progress::of_writing(&path("ply"), |path| write_ply_with_tone(path, &surface, &tone))?;
         }
         if writes(Format::Png) {
             let (width, height) = PICTURE;
@@ -333,9 +316,7 @@ impl Options {
             let camera = self.camera.unwrap_or_else(|| Camera::framing(&baked.light, aspect));
             let image = camera.image(&surface, width, height, SAMPLES)?;
             let tone = ToneCurve::fit_image(&image);
-            progress::of_writing(&self.path("png"), |path| {
-                write_png_with_tone(path, &image, &tone)
-            })?;
+            progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
         }
         Ok(())
     }

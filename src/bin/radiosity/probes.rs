@@ -9,9 +9,9 @@ use radiosity::scene::Aabb;
 use radiosity::{Error, Scene};
 use serde_json::json;
 
-use crate::args::{self, Parsed, Stop, numbers, value};
+use crate::args::{self, Output, Parsed, Stop, numbers, value};
 use crate::light::{Light, LightOptions};
-use crate::{interrupt, progress};
+use crate::progress;
 
 /// Gathers irradiance at a grid of probes in the air, as spherical harmonics for games
 #[derive(Args)]
@@ -37,14 +37,10 @@ pub struct Options {
     /// Lowest and highest corner of the box [default: those of the scene]
     #[arg(long = "box", value_name = "x,y,z,x,y,z", value_parser = bounds)]
     bounds: Option<Aabb>,
-    /// Path of the files without their endings, or a folder for files of the scene's name [default:
-    /// the scene without its ending]
-    #[arg(short, long, value_name = "STEM")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
     #[command(flatten)]
     light: LightOptions,
-    #[arg(skip)]
-    stem: PathBuf,
 }
 
 /// The lowest and the highest corner.
@@ -57,9 +53,7 @@ fn bounds(text: &str) -> Parsed<Aabb> {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        let formats = [("csv", ()), ("json", ())];
-        self.stem = args::stem(self.out.take(), self.scene.with_extension(""), &formats);
-        args::check_writable(&self.file("csv"))?;
+        self.output.name(self.scene.with_extension(""), &["csv", "json"])?;
         let scene = self.light.scene(&self.scene)?;
         let grid = self.grid(&scene)?;
         let light = self.light.bake(scene)?;
@@ -67,18 +61,10 @@ impl Options {
         let inside = probes.iter().filter(|probe| probe.is_inside()).count();
         let [x, y, z] = grid.counts;
         say!("{} probes, {x} by {y} by {z}, {inside} of them inside of something", probes.len());
-        progress::of_writing(&self.file("json"), |path| {
-            args::write_file(path, &json(&grid, &probes))
-        })?;
-        progress::of_writing(&self.file("csv"), |path| args::write_file(path, &csv(&probes)))?;
+        self.output.write("probes.json", &json(&grid, &probes))?;
+        self.output.write("probes.csv", &csv(&probes))?;
         progress::print_written();
         args::end()
-    }
-
-    fn file(&self, extension: &str) -> PathBuf {
-        let mut name = self.stem.clone().into_os_string();
-        name.push(format!(".probes.{extension}"));
-        name.into()
     }
 
     fn grid(&self, scene: &Scene) -> Result<ProbeGrid, Error> {
@@ -93,11 +79,8 @@ impl Options {
     fn gather(&self, grid: &ProbeGrid, light: &Light) -> Result<Option<Vec<Probe>>, Error> {
         let lit = &light.baked.light;
         let mut gatherer = light.device.gather_to_noise(lit, self.light.error())?;
-        progress::of_count("probes", |report| {
-            probes_at(lit, &grid.positions(), grid.size(), &mut *gatherer, |done, of| {
-                report(done, of)?;
-                interrupt::flow()
-            })
+        progress::of_stoppable("probes", |report| {
+            probes_at(lit, &grid.positions(), grid.size(), &mut *gatherer, report)
         })
     }
 }
@@ -137,8 +120,8 @@ fn json(grid: &ProbeGrid, probes: &[Probe]) -> Vec<u8> {
 
 /// A line a probe, with a header.
 fn csv(probes: &[Probe]) -> Vec<u8> {
-    let names = "x,y,z,inside,backs,escaped,deviation".split(',').map(String::from);
-    let coefficients = (0..9).flat_map(|k| ["r", "g", "b"].map(|channel| format!("{channel}{k}")));
+    let coefficients = (0..9).map(|k| format!(",r{k},g{k},b{k}")).collect::<String>();
+    let head = "x,y,z,inside,backs,escaped,deviation".to_string() + &coefficients;
     let line = |probe: &Probe| {
         let inside = f64::from(u8::from(probe.is_inside()));
         let start = [inside, probe.backface, probe.escaped, probe.deviation];
@@ -146,6 +129,5 @@ fn csv(probes: &[Probe]) -> Vec<u8> {
         let numbers = probe.position.to_array().into_iter().chain(start).chain(coefficients);
         numbers.map(|number| number.to_string()).collect()
     };
-    let head = names.chain(coefficients).collect();
-    args::csv(std::iter::once(head).chain(probes.iter().map(line)))
+    args::csv(&head, probes.iter().map(line))
 }

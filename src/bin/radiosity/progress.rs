@@ -14,6 +14,7 @@
 //!
 //! The seconds between lines go on from stage to stage, so that many short ones are no silence.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -22,6 +23,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use radiosity::Solver;
 use radiosity::bake::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
@@ -40,12 +42,13 @@ pub type OfBake<'a> = &'a mut dyn FnMut(&BakeProgress) -> ControlFlow<()>;
 /// Takes how much is done, and of how much.
 pub type OfCount<'a> = &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>;
 
-/// Runs `work` with the progress of a bake shown, and stops it on Ctrl-C. `unshot_goal` gives the
-/// share of unshot light at which shooting ends.
-pub fn of_bake<T>(unshot_goal: impl Fn() -> f64, work: impl FnOnce(OfBake) -> T) -> T {
+/// Runs `work` with the progress of a bake shown, and stops it on Ctrl-C. `work` may set the share
+/// of unshot light at which shooting ends.
+pub fn of_bake<T>(work: impl FnOnce(&Cell<f64>, OfBake) -> T) -> T {
     let mut display = Display::new("meshing");
-    work(&mut |progress| {
-        show(&mut display, progress, unshot_goal());
+    let unshot_goal = Cell::new(Solver::default().unshot);
+    work(&unshot_goal, &mut |progress| {
+        show(&mut display, progress, unshot_goal.get());
         interrupt::flow()
     })
 }
@@ -56,6 +59,16 @@ pub fn of_count<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
     work(&mut |done, of| {
         display.show(unit, share(done, of), &format!("{done} of {of} {unit}"));
         ControlFlow::Continue(())
+    })
+}
+
+/// The same, and stops it on Ctrl-C.
+pub fn of_stoppable<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
+    of_count(unit, |report| {
+        work(&mut |done, of| {
+            report(done, of)?;
+            interrupt::flow()
+        })
     })
 }
 

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use radiosity::backend::{AdapterInfo, RowMaker};
-use radiosity::bake::{ErrorEstimate, GroupError, Obstacle, Outcome};
+use radiosity::bake::{ErrorEstimate, GroupError, Obstacle, Outcome, Timings};
 use radiosity::bands::BandLight;
 use radiosity::solver::Ledger;
 use radiosity::{BakeResult, Rgb};
@@ -51,24 +51,16 @@ pub struct Report {
 }
 
 impl Report {
-    /// Seconds are wall time. Draw, reduce and read-back are parts of making rows; `solve` is the
-    /// rest of the shooting, repairs of rows included.
     pub fn to_json(&self) -> Value {
         let baked = &self.baked;
-        let s = baked.timings;
         let AdapterInfo { name, kind, driver } = &self.adapter;
         let by_resolution = baked.hemicubes_by_resolution.iter();
-        let by_resolution: Map<String, Value> =
-            by_resolution.map(|(pixels, count)| (pixels.to_string(), json!(count))).collect();
+        let by_resolution = by_resolution.map(|(pixels, count)| (pixels.to_string(), json!(count)));
+        let seconds = self.seconds().map(|(stage, seconds)| (stage.to_string(), json!(seconds)));
         let mut report = json!({
             "scene": self.scene,
             "adapter": { "name": name, "type": kind.to_string(), "driver": driver },
-            "goal": match self.target {
-                Target::Settings(_) => Value::Null,
-                Target::Error(error) => self.goal("error", error),
-                Target::ErrorEach(error) => self.goal("error_each", error),
-                Target::Seconds(seconds) => json!({ "seconds": seconds }),
-            },
+            "goal": self.goal(),
             "settings": settings::report(&baked.settings),
             "triangles": self.triangles,
             "sky": match &self.sky {
@@ -85,7 +77,7 @@ impl Report {
             "shots": baked.solution.shots,
             "hemicubes": baked.hemicubes,
             "rows_by": baked.row_maker.to_string(),
-            "hemicubes_by_resolution": by_resolution,
+            "hemicubes_by_resolution": Map::from_iter(by_resolution),
             "gathers": baked.light.gather_count,
             "gather_change": baked.light.relative_change,
             "gather_stop": self.gather_stop(),
@@ -94,12 +86,7 @@ impl Report {
             "ledger": ledger(&baked.solution.ledger),
             "error": self.errors(),
             "outcome": baked.outcome.to_string(),
-            "seconds": {
-                "load": self.load, "open": self.open, "mesh": s.mesh, "draw": s.draw,
-                "reduce": s.reduce, "readback": s.readback, "solve": s.solve,
-                "vertices": s.vertices, "estimate": s.estimate, "write": self.write,
-                "total": self.total,
-            },
+            "seconds": Map::from_iter(seconds),
             "camera": self.picture.map(|Picture { camera, .. }| json!({
                 "eye": camera.eye.to_array(), "target": camera.target.to_array(),
                 "up": camera.up.to_array(), "vertical_fov": camera.vertical_fov,
@@ -114,9 +101,14 @@ impl Report {
         report
     }
 
-    /// The error `name` that was to be reached, and within which time.
-    fn goal(&self, name: &str, error: f64) -> Value {
-        let mut goal = json!({ name: error });
+    /// What was to be reached, and within which time.
+    fn goal(&self) -> Value {
+        let mut goal = match self.target {
+            Target::Settings(_) => return Value::Null,
+            Target::Error(error) => json!({ "error": error }),
+            Target::ErrorEach(error) => json!({ "error_each": error }),
+            Target::Seconds(seconds) => return json!({ "seconds": seconds }),
+        };
         if let Some(limit) = self.limit {
             goal["seconds"] = json!(limit.as_secs_f64());
         }
@@ -215,78 +207,11 @@ impl Report {
 
     /// A line a subject, shares in percent.
     pub fn table(&self) -> String {
-        let AdapterInfo { name, kind, driver } = &self.adapter;
-        let (baked, light) = (&self.baked, &self.baked.light);
-        let (ledger, error, s) = (baked.solution.ledger, baked.estimate, baked.timings);
-        let emitted = ledger.emitted.element_sum();
-        let share = |flux: Rgb| {
-            if emitted > 0.0 { 100.0 * flux.element_sum() / emitted } else { 0.0 }
-        };
-        let mut lines = vec![
-            format!("adapter    {name} ({kind}), {driver}"),
-            format!(
-                "mesh       {} triangles, {} elements that shot, {} in the end, {} vertices",
-                self.triangles,
-                baked.mesh.element_count(),
-                light.mesh.element_count(),
-                light.surface.positions.len()
-            ),
-            format!(
-                "shooting   {} shots, {} {}, {}",
-                baked.solution.shots,
-                baked.hemicubes,
-                match baked.row_maker {
-                    RowMaker::Hemicubes => "hemicubes",
-                    RowMaker::DeviceRays => "rows of rays on the device",
-                    RowMaker::Rays => "rows of rays",
-                },
-                baked.solution.stop
-            ),
-            format!(
-                "gathering  {} points, {}, changed the vertices by {:.2} %",
-                light.gather_count,
-                self.gather_stop(),
-                100.0 * light.relative_change
-            ),
-            format!(
-                "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, {}unshot {:.2} %",
-                share(ledger.absorbed),
-                share(ledger.escaped),
-                share(ledger.backface_loss),
-                match share(ledger.pane_loss) {
-                    0.0 => String::new(),
-                    lost => format!("in panes {lost:.2} %, "),
-                },
-                share(ledger.unshot)
-            ),
-            format!(
-                "error      about {:.2} %: mesh {:.2}, sampling {:.2}, \
-                 truncation {:.2}, unshot {:.2}, sources {:.2}; tail {:.2}",
-                100.0 * error.total,
-                100.0 * error.mesh,
-                100.0 * error.sampling,
-                100.0 * error.truncation,
-                100.0 * error.unshot,
-                100.0 * error.sources,
-                100.0 * error.tail
-            ),
-            format!(
-                "seconds    load {:.2}, open {:.2}, mesh {:.2}, draw {:.2}, reduce {:.2}, \
-                 read back {:.2}, solve {:.2}, vertices {:.2}, error {:.2}, write {:.2}, \
-                 total {:.2}",
-                self.load,
-                self.open,
-                s.mesh,
-                s.draw,
-                s.reduce,
-                s.readback,
-                s.solve,
-                s.vertices,
-                s.estimate,
-                self.write,
-                self.total
-            ),
-        ];
+        let mut lines = self.work();
+        lines.push(light_line(&self.baked.solution.ledger));
+        lines.push(error_line(&self.baked.estimate));
+        let seconds = self.seconds().map(|(stage, seconds)| format!("{stage} {seconds:.2}"));
+        lines.push(format!("seconds    {}", seconds.join(", ")));
         lines.extend(self.luminaires.table());
         if let Some(Picture { camera, exposure }) = &self.picture {
             let camera = camera_value(camera);
@@ -297,6 +222,89 @@ impl Report {
         lines.extend(self.bands.as_ref().map(bands::words));
         lines.join("\n")
     }
+
+    /// What was made, and by what.
+    fn work(&self) -> Vec<String> {
+        let AdapterInfo { name, kind, driver } = &self.adapter;
+        let (baked, light) = (&self.baked, &self.baked.light);
+        let rows = match baked.row_maker {
+            RowMaker::Hemicubes => "hemicubes",
+            RowMaker::DeviceRays => "rows of rays on the device",
+            RowMaker::Rays => "rows of rays",
+        };
+        vec![
+            format!("adapter    {name} ({kind}), {driver}"),
+            format!(
+                "mesh       {} triangles, {} elements that shot, {} in the end, {} vertices",
+                self.triangles,
+                baked.mesh.element_count(),
+                light.mesh.element_count(),
+                light.surface.positions.len()
+            ),
+            format!(
+                "shooting   {} shots, {} {rows}, {}",
+                baked.solution.shots, baked.hemicubes, baked.solution.stop
+            ),
+            format!(
+                "gathering  {} points, {}, changed the vertices by {:.2} %",
+                light.gather_count,
+                self.gather_stop(),
+                100.0 * light.relative_change
+            ),
+        ]
+    }
+
+    /// Wall time of each stage. Draw, reduce and read-back are parts of making rows; `solve` is the
+    /// rest of the shooting, repairs of rows included.
+    fn seconds(&self) -> [(&'static str, f64); 11] {
+        let Timings { mesh, draw, reduce, readback, solve, vertices, estimate, .. } =
+            self.baked.timings;
+        [
+            ("load", self.load),
+            ("open", self.open),
+            ("mesh", mesh),
+            ("draw", draw),
+            ("reduce", reduce),
+            ("readback", readback),
+            ("solve", solve),
+            ("vertices", vertices),
+            ("estimate", estimate),
+            ("write", self.write),
+            ("total", self.total),
+        ]
+    }
+}
+
+/// The table's line of where the light went.
+fn light_line(ledger: &Ledger) -> String {
+    let emitted = ledger.emitted.element_sum();
+    let share = |flux: Rgb| if emitted > 0.0 { 100.0 * flux.element_sum() / emitted } else { 0.0 };
+    let in_panes = match share(ledger.pane_loss) {
+        0.0 => String::new(),
+        lost => format!("in panes {lost:.2} %, "),
+    };
+    format!(
+        "light      absorbed {:.2} %, left {:.2} %, met backs {:.2} %, {in_panes}unshot {:.2} %",
+        share(ledger.absorbed),
+        share(ledger.escaped),
+        share(ledger.backface_loss),
+        share(ledger.unshot)
+    )
+}
+
+/// The table's line of the parts of the error.
+fn error_line(error: &ErrorEstimate) -> String {
+    format!(
+        "error      about {:.2} %: mesh {:.2}, sampling {:.2}, truncation {:.2}, unshot {:.2}, \
+         sources {:.2}; tail {:.2}",
+        100.0 * error.total,
+        100.0 * error.mesh,
+        100.0 * error.sampling,
+        100.0 * error.truncation,
+        100.0 * error.unshot,
+        100.0 * error.sources,
+        100.0 * error.tail
+    )
 }
 
 /// The parts of an estimate.

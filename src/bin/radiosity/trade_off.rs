@@ -20,7 +20,7 @@ use radiosity::verify::{Estimate, Settings, Verification, Verifier};
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene};
 use runs::{Run, Target};
 
-use crate::args::{self, DeviceOptions, MeasureOptions, Stop, value};
+use crate::args::{self, DeviceOptions, MeasureOptions, Output, Stop, value};
 use crate::scene_options::{Input, SceneOptions};
 use crate::{interrupt, progress};
 
@@ -33,7 +33,8 @@ prints the runs by time. Seconds are those of the stages of a bake and of the es
 error, without reading the file and opening the device; short runs are timed three times, and the \
 least time counts. Errors are measured as `radiosity verify` does, all at the same points: these \
 are path traced once, until the error of the finest run is known well enough, or for 120 s. \
-After Ctrl-C the table of the finished runs is written.")]
+After Ctrl-C the table of the finished runs is written. STEM is the scene's path and _trade_off \
+unless --out gives another.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
@@ -47,17 +48,12 @@ pub struct Options {
     /// Fewer and coarser runs, around the settings for 5 %
     #[arg(long)]
     quick: bool,
-    /// Path of the files without their endings, or a folder for them [default: the scene without
-    /// its ending, and _trade_off]
-    #[arg(short, long, value_name = "STEM")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
     #[command(flatten)]
     reading: SceneOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Path of the files without their endings.
-    #[arg(skip)]
-    stem: PathBuf,
 }
 
 /// What came out of one bake.
@@ -97,14 +93,12 @@ impl Options {
     pub fn run(mut self) -> Result<(), Stop> {
         let mut stem = self.scene.with_extension("").into_os_string();
         stem.push("_trade_off");
-        let formats = [("csv", ()), ("png", ())];
-        self.stem = args::stem(self.out.take(), stem.into(), &formats);
-        args::check_writable(&self.stem)?;
+        self.output.name(stem.into(), &["csv", "png"])?;
         let Input { scene, .. } = self.reading.read(&self.scene)?;
         let results = self.results(Arc::new(scene))?;
         if !results.runs.is_empty() {
             say!("{}", results.text());
-            self.write("csv", &results.csv())?;
+            self.output.write("csv", &results.csv())?;
         }
         if interrupt::stopped() {
             eprintln!("stopped: the table has the runs that were finished; there is no chart");
@@ -113,7 +107,7 @@ impl Options {
                 let remedy = "the table of all runs has been written";
                 Error::new(ErrorKind::File, "the chart", found, remedy)
             };
-            self.write("png", &results.png().map_err(bad)?)?;
+            self.output.write("png", &results.png().map_err(bad)?)?;
         }
         progress::print_written();
         args::end()
@@ -139,11 +133,6 @@ impl Options {
             adapter: bench.device.adapter().name,
         })
     }
-
-    fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.stem.with_added_extension(ending);
-        progress::of_writing(&path, |path| args::write_file(path, bytes))
-    }
 }
 
 impl Bench {
@@ -160,11 +149,8 @@ impl Bench {
             let baked = self.bake(&name, &run.target)?;
             let surface = &baked.light.surface;
             let found = match k {
-                0 => progress::of_count("points", |report| {
-                    verifier.measure(surface, |progress| {
-                        report(progress.done, progress.of)?;
-                        interrupt::flow()
-                    })
+                0 => progress::of_stoppable("points", |report| {
+                    verifier.measure(surface, |progress| report(progress.done, progress.of))
                 }),
                 _ => verifier.measure_at_same_points(surface),
             }?;

@@ -123,10 +123,9 @@ impl Options {
         claimed.check_sky(scene, self.reading.sky.words(scene), ply)?;
         claimed.check_luminaires(&luminaires.report(), ply)?;
         interrupt::catch();
-        let found = progress::of_count("points", |report| {
+        let found = progress::of_stoppable("points", |report| {
             verify(scene, &solution, &self.settings(), |progress| {
-                report(progress.done, progress.of)?;
-                interrupt::flow()
+                report(progress.done, progress.of)
             })
         })?;
         let lines = lines(scene, &found, &claimed);
@@ -382,7 +381,7 @@ fn csv(lines: &[Line]) -> Vec<u8> {
             number(line.ratio()),
         ]
     });
-    args::csv(std::iter::once(head.split(',').map(String::from).collect()).chain(rows))
+    args::csv(head, rows)
 }
 
 impl Line {

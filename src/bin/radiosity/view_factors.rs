@@ -117,13 +117,7 @@ impl Options {
             args::check_writable(&format.path(&stem))?;
         }
         let scene = self.to_error.scene(path)?;
-        let groups = scene.groups().len();
-        let formats =
-            self.matrix.formats.clone().unwrap_or_else(|| files::Format::default_for(groups));
-        for format in &formats {
-            format.check(groups)?;
-            args::check_writable(&format.path(&stem))?;
-        }
+        let formats = self.matrix.formats_for(scene.groups().len(), &stem)?;
         let of_light = |w: &&Warning| {
             matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
         };

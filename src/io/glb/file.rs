@@ -160,6 +160,25 @@ impl GlbFile {
         self.root.push(Node { mesh: Some(mesh), name, ..Default::default() })
     }
 
+    /// Puts the views one after the other in the buffer; returns the bytes that they take.
+    fn lay_out_views(&mut self) -> usize {
+        let mut length = 0;
+        for view in &self.views {
+            self.root.push(View {
+                buffer: Index::new(0),
+                byte_length: view.bytes.len().into(),
+                byte_offset: Some(length.into()),
+                byte_stride: view.stride,
+                name: None,
+                target: view.target.map(Valid),
+                extensions: None,
+                extras: None,
+            });
+            length += view.bytes.len();
+        }
+        length
+    }
+
     /// Writes the file: a header, a chunk of JSON and one of numbers. Its scene is a node with the
     /// nodes of all `groups`, whose positions are relative to `origin`.
     ///
@@ -177,20 +196,7 @@ impl GlbFile {
         let nodes = vec![self.root.push(top)];
         let scene = Scene { nodes, name: None, extensions: None, extras: None };
         self.root.scene = Some(self.root.push(scene));
-        let mut length = 0;
-        for view in &self.views {
-            self.root.push(View {
-                buffer: Index::new(0),
-                byte_length: view.bytes.len().into(),
-                byte_offset: Some(length.into()),
-                byte_stride: view.stride,
-                name: None,
-                target: view.target.map(Valid),
-                extensions: None,
-                extras: None,
-            });
-            length += view.bytes.len();
-        }
+        let length = self.lay_out_views();
         let binary = length.next_multiple_of(4);
         self.root.push(Buffer {
             byte_length: binary.into(),

@@ -35,32 +35,16 @@ impl ObjFile<'_> {
                 let find = |name: &str| images.get(name).map(Some);
                 texture_map(statement, find, &mut self.repairs, place, without)
             };
-            let is_given = |colour: &Rgb| *colour != Rgb::ZERO;
             if let Some(statement) = mtl.textures[0].as_deref().filter(|_| !mtl.is_black(settings))
                 && let Some(map) = map(statement)?
             {
-                let ceiling = settings.max_reflectance.min(mtl.diffuse_room(settings));
-                let mut factor = match mtl.reflectance.filter(is_given) {
-                    Some(_) => material.albedo(),
-                    None => Rgb::splat(ceiling),
-                };
-                if material.is_translucent() {
-                    // The transmittance is a fraction of the texture's total; the remaining
-                    // reflectance gives the distribution over the texture.
-                    let all = factor * map.texture.whole_mean();
-                    let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
-                    let share = share.min(Rgb::splat(0.99));
-                    material.transmittance = share * all;
-                    factor *= Rgb::ONE - share;
-                }
-                let mean = factor * map.texture.whole_mean();
-                maps.reflectance = Some(TextureMap { factor, ceiling, mean, ..map });
+                maps.reflectance = Some(mtl.reflectance_map(map, material, settings));
             }
             if let Some(statement) = &mtl.textures[1]
                 && let Some(map) = map(statement)?
                 && !settings.emit.iter().any(|(name, _)| *name == material.name)
             {
-                let radiance = mtl.radiance.filter(is_given).unwrap_or(Rgb::ONE);
+                let radiance = mtl.radiance.filter(is_not_black).unwrap_or(Rgb::ONE);
                 let factor = PI * radiance.max(Rgb::ZERO);
                 let mean = factor * map.texture.whole_mean();
                 maps.exitance = Some(TextureMap { factor, mean, ..map });
@@ -223,7 +207,37 @@ fn texture_map(
     }))
 }
 
+fn is_not_black(colour: &Rgb) -> bool {
+    *colour != Rgb::ZERO
+}
+
 impl MtlMaterial {
+    /// `map` as the texture of the reflectance of `material`, which is this one: by `Kd`, or whole
+    /// without one. If the material is translucent, its transmittance becomes a share of it.
+    fn reflectance_map(
+        &self,
+        map: TextureMap,
+        material: &mut Material,
+        settings: &ObjSettings,
+    ) -> TextureMap {
+        let ceiling = settings.max_reflectance.min(self.diffuse_room(settings));
+        let mut factor = match self.reflectance.filter(is_not_black) {
+            Some(_) => material.albedo(),
+            None => Rgb::splat(ceiling),
+        };
+        if material.is_translucent() {
+            // The transmittance is a fraction of the texture's total; the remaining reflectance
+            // gives the distribution over the texture.
+            let all = factor * map.texture.whole_mean();
+            let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
+            let share = share.min(Rgb::splat(0.99));
+            material.transmittance = share * all;
+            factor *= Rgb::ONE - share;
+        }
+        let mean = factor * map.texture.whole_mean();
+        TextureMap { factor, ceiling, mean, ..map }
+    }
+
     /// The mirror or glass of this material, if the settings use it.
     fn specular(&self, settings: &ObjSettings) -> Option<Specular> {
         self.specular.filter(|_| settings.specular != SpecularSurfaces::Ignore)

@@ -200,24 +200,12 @@ impl Statements {
         repairs: &mut Repairs,
         out: &mut Vec<u8>,
     ) -> Result<(), Error> {
-        self.corners.clear();
-        for word in words(rest) {
-            let corner = self.corner(line, word)?;
-            self.corners.push(corner);
-        }
-        let given = self.corners.len();
-        self.corners.dedup_by_key(|corner| corner[0]);
-        let ends = |corners: &[[u32; 2]]| {
-            corners.len() > 1 && corners[0][0] == corners[corners.len() - 1][0]
-        };
-        while ends(&self.corners) {
-            self.corners.pop();
-        }
+        let repeated = self.read_corners(line, rest)?;
         let [first, second] = [0, 1].map(|k| self.corners.get(k).map(|c| c[0]));
         if !self.corners.iter().any(|c| Some(c[0]) != first && Some(c[0]) != second) {
             return repairs.note(WarningKind::FewCorners, line, "", "dropped");
         }
-        if self.corners.len() < given {
+        if repeated {
             repairs.note(WarningKind::RepeatedCorner, line, "", "taken for one")?;
         }
         if self.model_corners >= 1 << 14 {
@@ -242,6 +230,25 @@ impl Statements {
         }
         emit(out, format_args!("\n"));
         Ok(())
+    }
+
+    /// Reads the corners of a face, each once where it comes several times in a row; returns whether
+    /// one does.
+    fn read_corners(&mut self, line: &Line, rest: &str) -> Result<bool, Error> {
+        self.corners.clear();
+        for word in words(rest) {
+            let corner = self.corner(line, word)?;
+            self.corners.push(corner);
+        }
+        let given = self.corners.len();
+        self.corners.dedup_by_key(|corner| corner[0]);
+        let ends = |corners: &[[u32; 2]]| {
+            corners.len() > 1 && corners[0][0] == corners[corners.len() - 1][0]
+        };
+        while ends(&self.corners) {
+            self.corners.pop();
+        }
+        Ok(self.corners.len() < given)
     }
 
     /// Turns each face into a group of its own, named `group/n` for the n-th face of its group.

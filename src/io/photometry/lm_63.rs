@@ -11,6 +11,7 @@
 //!
 //! Length is along C = 0°, width across it. ANSI/IESNA LM-63-2002, sections 5.3 to 5.13.
 
+use std::iter::Peekable;
 use std::path::Path;
 
 use glam::DVec3;
@@ -56,28 +57,10 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
 
 fn read_with(file: &Path, text: &str, comma: Comma) -> Result<Photometry, Error> {
     let mut warnings = vec![];
-    let mut names = [const { String::new() }; 3];
     let mut rest = physical_lines(file, text).peekable();
-    let mut said = None;
-    while let Some(line) = rest.peek() {
-        if let Some(value) = tilt(line) {
-            said = Some(value.to_string());
-            rest.next();
-            break;
-        }
-        if is_header(line, comma) {
-            break;
-        }
-        for (name, keyword) in names.iter_mut().zip(["[MANUFAC]", "[LUMINAIRE]", "[LUMCAT]"]) {
-            let value = line.text.strip_prefix(keyword).map(name_of);
-            if name.is_empty() {
-                *name = value.unwrap_or_default();
-            }
-        }
-        rest.next();
-    }
+    let (name, tilt) = keywords(&mut rest, comma);
     let mut numbers = Numbers::new(file, rest, comma);
-    match said.as_deref() {
+    match tilt.as_deref() {
         Some(none) if none.eq_ignore_ascii_case("NONE") => {}
         Some(include) if include.eq_ignore_ascii_case("INCLUDE") => {
             skip_tilt(&mut numbers, &mut warnings)?;
@@ -103,15 +86,37 @@ fn read_with(file: &Path, text: &str, comma: Comma) -> Result<Photometry, Error>
     if left > 0 {
         warnings.push(format!("{left} words after the last candela value are left out"));
     }
-    let named = names.into_iter().filter(|name| !name.is_empty()).collect::<Vec<_>>();
     Ok(Photometry {
-        name: name_of(&named.join(" ")),
+        name,
         intensity: intensity.into(),
         opening: header.opening,
         lamp_flux: header.lamp_flux,
         power: header.power,
         warnings,
     })
+}
+
+/// The name of the luminaire by the lines before those of numbers, and its tilt, if it has one.
+fn keywords<'a>(
+    lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
+    comma: Comma,
+) -> (String, Option<String>) {
+    let mut names = [const { String::new() }; 3];
+    let mut said = None;
+    while let Some(line) = lines.next_if(|line| !is_header(line, comma)) {
+        said = tilt(&line).map(String::from);
+        if said.is_some() {
+            break;
+        }
+        for (name, keyword) in names.iter_mut().zip(["[MANUFAC]", "[LUMINAIRE]", "[LUMCAT]"]) {
+            let value = line.text.strip_prefix(keyword).map(name_of);
+            if name.is_empty() {
+                *name = value.unwrap_or_default();
+            }
+        }
+    }
+    let named = names.into_iter().filter(|name| !name.is_empty()).collect::<Vec<_>>();
+    (name_of(&named.join(" ")), said)
 }
 
 /// Whether a line is the first one of numbers, for files without a tilt line.

@@ -119,9 +119,6 @@ fn interpolated(points: &[(f64, f64)], band: &Band) -> Result<f64, (String, &'st
 /// [`ErrorKind::File`] where it cannot be read or is not understood; those of [`Bands::check`].
 pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
     let file = path.display().to_string();
-    let wrong = |place: String, found: String, remedy: &str| {
-        Error::new(ErrorKind::File, place, found, remedy)
-    };
     let bytes = std::fs::read(path).map_err(|e| {
         let found = format!("cannot be read: {e}");
         wrong(file.clone(), found, "give a JSON file that can be read").with_source(e)
@@ -137,26 +134,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         let place = || format!("{file}: {what}");
         spectrum.values(&bands).map_err(|(found, remedy)| wrong(place(), found, remedy))
     };
-    let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
-    if let Some(name) = materials.keys().find(|name| *name != "*" && !known(name)) {
-        let found = format!("material '{name}', which is not there");
-        return Err(wrong(file, found, "name materials as the scene does"));
-    }
-    let mut of_bands = vec![];
-    for material in scene.materials() {
-        let name = &material.name;
-        let entry = materials.get(name).or_else(|| materials.get("*")).ok_or_else(|| {
-            let remedy = "give it an entry, or one for all others, *";
-            wrong(file.clone(), format!("nothing of material '{name}'"), remedy)
-        })?;
-        let of = |what: &str| format!("{what} of '{name}'");
-        let emission = values(&entry.emission, &of("emission"))?;
-        of_bands.push(BandMaterial {
-            reflectance: values(&entry.reflectance, &of("reflectance"))?,
-            transmittance: values(&entry.transmittance, &of("transmittance"))?,
-            exitance: emission.into_iter().map(|radiance| PI * radiance).collect(),
-        });
-    }
+    let of_bands = of_materials(&materials, scene, &file, &values)?;
     let (sky, sun) = (values(&sky, "sky")?, values(&sun, "sun")?);
     let luminaires = match luminaires {
         Some(spectrum) => values(&spectrum, "luminaires")?,
@@ -177,6 +155,40 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
     Ok(bands)
 }
 
+fn wrong(place: String, found: String, remedy: &str) -> Error {
+    Error::new(ErrorKind::File, place, found, remedy)
+}
+
+/// What the `materials` of a `file` are in the scene's, in their order; `values` reads a spectrum.
+fn of_materials(
+    materials: &BTreeMap<String, MaterialEntry>,
+    scene: &Scene,
+    file: &str,
+    values: &dyn Fn(&Spectrum, &str) -> Result<Vec<f64>, Error>,
+) -> Result<Vec<BandMaterial>, Error> {
+    let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
+    if let Some(name) = materials.keys().find(|name| *name != "*" && !known(name)) {
+        let found = format!("material '{name}', which is not there");
+        return Err(wrong(file.into(), found, "name materials as the scene does"));
+    }
+    let mut of_bands = vec![];
+    for material in scene.materials() {
+        let name = &material.name;
+        let entry = materials.get(name).or_else(|| materials.get("*")).ok_or_else(|| {
+            let remedy = "give it an entry, or one for all others, *";
+            wrong(file.into(), format!("nothing of material '{name}'"), remedy)
+        })?;
+        let of = |what: &str| format!("{what} of '{name}'");
+        let emission = values(&entry.emission, &of("emission"))?;
+        of_bands.push(BandMaterial {
+            reflectance: values(&entry.reflectance, &of("reflectance"))?,
+            transmittance: values(&entry.transmittance, &of("transmittance"))?,
+            exitance: emission.into_iter().map(|radiance| PI * radiance).collect(),
+        });
+    }
+    Ok(of_bands)
+}
+
 /// The bands of the file `path`, told what the bake does not see of them.
 pub fn read_and_warn(path: &Path, scene: &Scene) -> Result<Bands, Error> {
     let bands = progress::of_reading(path, || read(path, scene))?;
@@ -191,38 +203,29 @@ pub fn read_and_warn(path: &Path, scene: &Scene) -> Result<Bands, Error> {
     Ok(bands)
 }
 
-/// The light of `bands`; none where Ctrl-C stopped it.
-pub fn light(bands: &Bands, baked: &BakeResult) -> Result<Option<BandLight>, Error> {
-    if interrupt::stopped() {
-        return Ok(None);
-    }
-    progress::of_count("rows of vertices, for all bands", |report| {
-        bands.light(baked, |done, of| {
-            // The bar never stops it.
-            let _ = report(done, of);
-            interrupt::flow()
-        })
-    })
+/// The light of `bands`, if there are any; none where Ctrl-C stopped it.
+pub fn light(bands: Option<&Bands>, baked: &BakeResult) -> Result<Option<BandLight>, Error> {
+    let Some(bands) = bands.filter(|_| !interrupt::stopped()) else { return Ok(None) };
+    progress::of_stoppable("rows of vertices, for all bands", |report| bands.light(baked, report))
 }
 
-/// Writes a line a vertex: its position, then radiosity, irradiance and error by band.
-pub fn write_table(path: &Path, light: &BandLight) -> Result<(), Error> {
+/// A line a vertex: its position, then radiosity, irradiance and error by band.
+pub fn table(light: &BandLight) -> Vec<u8> {
     let count = light.bands.len();
     let columns = [
         ("radiosity", &light.radiosity),
         ("irradiance", &light.irradiance),
         ("error", &light.noise),
     ];
-    let name = |what: &str| -> Vec<String> {
-        light.bands.iter().map(|band| format!("{what}_{}", band.name)).collect()
-    };
-    let mut head = ["x", "y", "z"].map(String::from).to_vec();
-    head.extend(columns.iter().flat_map(|(what, _)| name(what)));
+    let mut head = "x,y,z".to_string();
+    for (what, _) in columns {
+        light.bands.iter().for_each(|band| head += &format!(",{what}_{}", band.name));
+    }
     let lines = light.surface.positions.iter().enumerate().map(|(v, position)| {
         let values = columns.iter().flat_map(|(_, values)| &values[v * count..][..count]);
         position.to_array().iter().chain(values).map(f64::to_string).collect()
     });
-    args::write_file(path, &args::csv(std::iter::once(head).chain(lines)))
+    args::csv(&head, lines)
 }
 
 /// What the report tells of each band: its error and its sweeps, by name.

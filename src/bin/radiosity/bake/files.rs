@@ -1,6 +1,6 @@
 //! The files that a bake writes: STEM with the ending of each.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use radiosity::bake::ErrorEstimate;
@@ -12,7 +12,7 @@ use radiosity::{
     Backend, BakeResult, Camera, Error, ErrorKind, GatheredMesh, VertexMesh, write_exr, write_glb,
 };
 
-use crate::args::{self, List, Names, Parsed, give, numbers, some_of, value};
+use crate::args::{self, List, Names, Output, Parsed, give, numbers, some_of, value};
 use crate::bake::bands;
 use crate::progress;
 
@@ -44,13 +44,8 @@ const FORMATS: Names<Format> = &[
 #[derive(Args)]
 #[command(next_help_heading = "Files")]
 pub struct Files {
-    /// Path of the files without their endings, or a folder for files of the scene's name [default:
-    /// the scene without its ending]
-    #[arg(short, long, value_name = "STEM")]
-    out: Option<PathBuf>,
-    /// Path of the files without their ending.
-    #[arg(skip)]
-    stem: PathBuf,
+    #[command(flatten)]
+    output: Output,
     /// Files: ply, vertices with radiosity and error; glb, the same for viewers of glTF; json, a
     /// report; exr and png, a picture; csv, with --bands, a table
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
@@ -84,14 +79,10 @@ pub struct Picture {
 }
 
 impl Files {
-    /// Names the files after the scene, where they are given no name.
-    pub fn name_after(&mut self, scene: &Path) {
-        self.stem = args::stem(self.out.take(), scene.with_extension(""), FORMATS);
-    }
-
-    /// Whether all of it can be written, before any work is done for it.
-    pub fn check(&self) -> Result<(), Error> {
-        args::check_writable(&self.stem)?;
+    /// Names the files after the scene, where they are given no name, and checks whether all of it
+    /// can be written, before any work is done for it.
+    pub fn name_after(&mut self, scene: &Path) -> Result<(), Error> {
+        self.output.name(scene.with_extension(""), &args::names(FORMATS))?;
         if let Some(exposure) = self.exposure
             && !(exposure > 0.0 && exposure.is_finite())
         {
@@ -108,10 +99,6 @@ impl Files {
 
     fn writes(&self, format: Format) -> bool {
         self.formats.contains(&format)
-    }
-
-    fn path(&self, ending: &str) -> PathBuf {
-        self.stem.with_added_extension(ending)
     }
 
     /// Writes pictures and meshes, and tells how the picture was taken, if there is one.
@@ -154,7 +141,7 @@ impl Files {
         image: &RadianceImage,
         tone: &ToneCurve,
     ) -> Result<(), Error> {
-        let path = |ending| self.path(&format!("{of}{ending}"));
+        let path = |ending| self.output.path(&format!("{of}{ending}"));
         if self.writes(Format::Exr) {
             progress::of_writing(&path("exr"), |path| write_exr(path, image))?;
         }
@@ -167,17 +154,18 @@ impl Files {
     /// Writes meshes; their colours are those of the picture.
     fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) -> Result<(), Error> {
         if self.writes(Format::Ply) {
-            progress::of_writing(&self.path("ply"), |path| {
+            progress::of_writing(&self.output.path("ply"), |path| {
                 let mut surface = baked.light.surface.clone();
                 surface.comments = comments(baked);
                 write_ply_with_tone(path, &surface, tone)
             })?;
         }
         if self.writes(Format::Glb) {
-            progress::of_writing(&self.path("glb"), |path| write_glb(path, &baked.light, tone))?;
+            let write = |path: &Path| write_glb(path, &baked.light, tone);
+            progress::of_writing(&self.output.path("glb"), write)?;
         }
         if self.elements {
-            progress::of_writing(&self.path("elements.ply"), |path| {
+            progress::of_writing(&self.output.path("elements.ply"), |path| {
                 let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
                 write_ply_with_tone(path, &flat, tone)
             })?;
@@ -205,12 +193,12 @@ impl Files {
         }
         if self.writes(Format::Ply) {
             let tone = tone.map(ToneCurve::of_radiosity);
-            progress::of_writing(&self.path("bands.ply"), |path| {
+            progress::of_writing(&self.output.path("bands.ply"), |path| {
                 write_ply_bands(path, light, tone.as_ref())
             })?;
         }
         if self.writes(Format::Csv) {
-            progress::of_writing(&self.path("bands.csv"), |path| bands::write_table(path, light))?;
+            self.output.write("bands.csv", &bands::table(light))?;
         }
         Ok(())
     }
@@ -220,9 +208,7 @@ impl Files {
         if !self.writes(Format::Json) {
             return Ok(());
         }
-        progress::of_writing(&self.path("json"), |path| {
-            args::write_file(path, format!("{json:#}\n").as_bytes())
-        })
+        self.output.write("json", format!("{json:#}\n").as_bytes())
     }
 
     /// The picture, interpolated between vertices or gathered by its pixels.

@@ -10,9 +10,9 @@ pub fn csv(grids: &[MeasuredGrid], quantity: Quantity) -> Vec<u8> {
         Quantity::Irradiance => "irradiance",
         Quantity::Illuminance => "illuminance",
     };
-    let channels = ["irradiance_r", "irradiance_g", "irradiance_b", "inside"];
-    let head = ["grid", "column", "row", "x", "y", "z", name, "standard_error"];
-    let mut rows = vec![head.into_iter().chain(channels).map(String::from).collect()];
+    let channels = "irradiance_r,irradiance_g,irradiance_b";
+    let head = format!("grid,column,row,x,y,z,{name},standard_error,{channels},inside");
+    let mut rows = vec![];
     for (k, measured) in grids.iter().enumerate() {
         let grid = &measured.grid;
         for (n, (point, value)) in grid.points.iter().zip(&measured.values).enumerate() {
@@ -27,5 +27,5 @@ pub fn csv(grids: &[MeasuredGrid], quantity: Quantity) -> Vec<u8> {
             rows.push(row);
         }
     }
-    args::csv(rows)
+    args::csv(&head, rows)
 }

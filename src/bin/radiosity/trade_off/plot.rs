@@ -11,6 +11,9 @@ use crate::canvas::{self, At, BLACK, Canvas, Drawn, Font, GREY, LIGHT, Side};
 const FRONT: RGBColor = RGBColor(31, 95, 168);
 const TARGET: RGBColor = RGBColor(205, 72, 20);
 
+/// Left, top, right and bottom of the map, pixels.
+const MAP: [f64; 4] = [95.0, 124.0, 1180.0, 750.0];
+
 impl Results {
     /// The chart as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, String> {
@@ -18,7 +21,14 @@ impl Results {
     }
 
     fn draw(&self, canvas: &Canvas) -> Drawn {
-        let [left, top, right, bottom] = [95.0, 124.0, 1180.0, 750.0];
+        self.draw_frame(canvas)?;
+        legend(canvas, 94.0)?;
+        self.draw_runs(canvas)
+    }
+
+    /// The title, and the axes.
+    fn draw_frame(&self, canvas: &Canvas) -> Drawn {
+        let [left, top, right, bottom] = MAP;
         let title = format!("What a bake of {} costs and how far it is off", self.scene);
         canvas.text(&title, (left, 28.0), Font::new(26.0, BLACK).bold())?;
         let tail = 100.0 * self.measure.tail;
@@ -28,16 +38,18 @@ impl Results {
             self.adapter
         );
         canvas.text(&line, (left, 62.0), Font::new(17.0, GREY))?;
-        legend(canvas, 94.0)?;
-
         let (seconds, errors) = self.scales();
         let corner = (left, bottom);
         canvas.axis(&seconds, [corner, (right, bottom)], Side::Below, bottom - top)?;
         canvas.axis(&errors, [corner, (left, top)], Side::Left, right - left)?;
         let font = Font::new(16.0, BLACK).anchor(HPos::Center);
         canvas.text("seconds", ((left + right) / 2.0, bottom + 46.0), font)?;
-        canvas.upright("error, % of radiosity", (left - 62.0, (top + bottom) / 2.0), font)?;
+        canvas.upright("error, % of radiosity", (left - 62.0, (top + bottom) / 2.0), font)
+    }
 
+    /// The errors that were asked for, all runs, and the names of the best.
+    fn draw_runs(&self, canvas: &Canvas) -> Drawn {
+        let ([left, top, right, bottom], (seconds, errors)) = (MAP, self.scales());
         let at = |time: f64, error: f64| {
             let x = left + (right - left) * seconds.share(time);
             (x, bottom - (bottom - top) * errors.share(100.0 * error))

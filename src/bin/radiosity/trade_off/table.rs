@@ -35,15 +35,9 @@ impl Results {
 
     /// A row a run under a row of column names; shares, not per cent.
     pub fn csv(&self) -> Vec<u8> {
-        let mut rows = vec![];
-        for k in 0..self.runs.len() {
-            let (names, cells): (Vec<&str>, Vec<String>) = self.row(k).into_iter().unzip();
-            if k == 0 {
-                rows.push(names.into_iter().map(String::from).collect());
-            }
-            rows.push(cells);
-        }
-        args::csv(rows)
+        let names: Vec<&str> = self.row(0).into_iter().map(|(name, _)| name).collect();
+        let cells = |k| self.row(k).into_iter().map(|(_, cell)| cell).collect();
+        args::csv(&names.join(","), (0..self.runs.len()).map(cells))
     }
 
     /// Columns and cells of run `k`.

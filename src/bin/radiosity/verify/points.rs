@@ -123,7 +123,7 @@ impl TracedPoints {
             let numbers = [point.position, *radiosity, *error].map(|v| v.to_array()).concat();
             numbers.iter().map(f64::to_string).collect()
         });
-        args::csv(std::iter::once(head.split(',').map(String::from).collect()).chain(lines))
+        args::csv(head, lines)
     }
 }
 

@@ -11,7 +11,7 @@ use radiosity::io::write_npz;
 use radiosity::view_factor::Estimate;
 use radiosity::{Error, ErrorKind, ViewFactors};
 
-use crate::args::{List, Names, some_of};
+use crate::args::{self, List, Names, some_of};
 
 /// Groups of a square table at most: 134 million numbers, some gigabyte of text.
 const MAX_DENSE_GROUPS: usize = 1 << 13;
@@ -55,31 +55,39 @@ struct Entry {
     standard_error: f64,
 }
 
-impl Format {
-    /// Those that are written unless others are asked for.
-    pub fn default_for(groups: usize) -> Vec<Format> {
-        if groups <= MAX_DENSE_GROUPS { vec![Format::Csv, Format::List] } else { vec![Format::Npz] }
+impl MatrixOptions {
+    /// The formats of a matrix of so many groups, whose files can be written beside `stem`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] where the groups are too many for a square table; those of
+    /// [`args::check_writable`].
+    pub fn formats_for(&self, groups: usize, stem: &Path) -> Result<Vec<Format>, Error> {
+        let default = match groups <= MAX_DENSE_GROUPS {
+            true => vec![Format::Csv, Format::List],
+            false => vec![Format::Npz],
+        };
+        let formats = self.formats.clone().unwrap_or(default);
+        for format in &formats {
+            format.check(groups)?;
+            args::check_writable(&format.path(stem))?;
+        }
+        Ok(formats)
     }
+}
 
+impl Format {
     fn name(self) -> &'static str {
         FORMATS.iter().find(|(_, format)| *format == self).map_or("", |(name, _)| name)
     }
 
-    /// # Errors
-    /// [`ErrorKind::Setting`] where so many groups are too many for a square table.
-    pub fn check(self, groups: usize) -> Result<(), Error> {
-        let is_dense = matches!(self, Format::Csv | Format::Npy);
-        if is_dense && groups > MAX_DENSE_GROUPS {
-            let found = format!("a square table of {groups} groups");
-            let remedy = format!("above {MAX_DENSE_GROUPS} take list, mtx or npz");
-            return Err(Error::new(
-                ErrorKind::Setting,
-                format!("--format {}", self.name()),
-                found,
-                remedy,
-            ));
+    fn check(self, groups: usize) -> Result<(), Error> {
+        if groups <= MAX_DENSE_GROUPS || !matches!(self, Format::Csv | Format::Npy) {
+            return Ok(());
         }
-        Ok(())
+        let place = format!("--format {}", self.name());
+        let found = format!("a square table of {groups} groups");
+        let remedy = format!("above {MAX_DENSE_GROUPS} take list, mtx or npz");
+        Err(Error::new(ErrorKind::Setting, place, found, remedy))
     }
 
     pub fn path(self, stem: &Path) -> PathBuf {

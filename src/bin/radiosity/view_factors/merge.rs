@@ -1,13 +1,13 @@
 //! `radiosity merge`: rows of view factors from many machines, put together.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use radiosity::Error;
 use radiosity::io::view_factors::read_rows;
 use radiosity::view_factor::PartialMatrix;
 
-use super::files::{FORMATS, Format, MatrixOptions};
+use super::files::{FORMATS, MatrixOptions};
 use super::{enforce, print_checks, write_all};
 use crate::args::{self, Stop};
 use crate::progress;
@@ -31,24 +31,19 @@ pub struct Options {
 impl Options {
     /// Runs the command.
     pub fn run(self) -> Result<(), Stop> {
-        let Options { paths, matrix: MatrixOptions { enforce: enforced, formats }, out } = self;
+        let Options { paths, matrix: options, out } = self;
         // SCENE.A-B.rows
         let stem = paths[0].with_extension("").with_extension("");
-        let stem = args::stem(out, stem, FORMATS);
-        let parts =
-            paths.iter().map(|path: &PathBuf| progress::of_reading(path, || read_rows(path)));
-        let parts = parts.collect::<Result<Vec<_>, Error>>()?;
+        let stem = args::stem(out, stem, &args::names(FORMATS));
+        let read = |path: &PathBuf| progress::of_reading(path, || read_rows(path));
+        let parts = paths.iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let mut matrix = PartialMatrix::merge(parts)?.into_matrix()?;
         let groups = matrix.names.len();
-        let formats = formats.unwrap_or_else(|| Format::default_for(groups));
-        for format in &formats {
-            format.check(groups)?;
-            args::check_writable(&format.path(&stem))?;
-        }
+        let formats = options.formats_for(groups, &stem)?;
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
-        say!("{}: {groups} groups, {nonzeros} nonzeros", Path::new(&stem).display());
+        say!("{}: {groups} groups, {nonzeros} nonzeros", stem.display());
         print_checks(&matrix);
-        if enforced {
+        if options.enforce {
             matrix = enforce(&matrix);
         }
         Ok(write_all(&formats, &stem, &matrix)?)
