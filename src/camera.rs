@@ -27,7 +27,6 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::GatheredMesh;
 use crate::geometry::COINCIDENCE_TOLERANCE;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
@@ -200,18 +199,6 @@ impl PrimaryRays<'_> {
             samples,
             weight,
         })
-    }
-
-    /// The same for the surface of `light`, whose mesh has the holes and the covers of backs.
-    fn of_light<'a>(
-        camera: &Camera,
-        light: &'a GatheredMesh,
-        width: u32,
-        height: u32,
-        samples: u32,
-    ) -> Result<PrimaryRays<'a>, Error> {
-        let GatheredMesh { mesh, surface, .. } = light;
-        PrimaryRays::new(camera, surface, Some(mesh), width, height, samples)
     }
 
     /// Ranges of the first `pixels` pixels, in order, with about `rays` primary rays each.

@@ -1,5 +1,6 @@
 //! Work distributed over processes that all have the whole input, as with MPI.
 
+use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -37,37 +38,28 @@ impl Ranks for Alone {
     }
 }
 
-/// Results of all ranks in the order of the `items`, which were assigned round-robin.
-pub(crate) fn in_order<R>(of_ranks: Vec<Vec<R>>, items: usize) -> Vec<R> {
-    let size = of_ranks.len();
-    let mut of_ranks: Vec<_> = of_ranks.into_iter().map(Vec::into_iter).collect();
-    (0..items).filter_map(|k| of_ranks[k % size].next()).collect()
-}
-
-/// Selects the items of one process: they are assigned round-robin.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Share {
-    rank: usize,
-    size: usize,
-}
-
-impl Share {
-    pub fn of(ranks: &dyn Ranks) -> Share {
-        Share { rank: ranks.rank(), size: ranks.size() }
+/// The results of `work` for all `items`, in their order, computed by all processes and the threads
+/// of each.
+///
+/// Items are assigned round-robin: neighbours take about the same time, so that the load is
+/// balanced.
+pub(crate) fn share_out<T: Sync, R: Send + Serialize + DeserializeOwned>(
+    items: &[T],
+    ranks: &mut dyn Ranks,
+    work: impl Fn(&T) -> R + Sync,
+) -> Vec<R> {
+    let (rank, size) = (ranks.rank(), ranks.size());
+    let own = items.par_iter().skip(rank).step_by(size);
+    let results: Vec<R> = own.map(&work).collect();
+    if size == 1 {
+        return results;
     }
-
-    /// The share of `items`.
-    pub fn from<T>(self, items: &[T]) -> impl Iterator<Item = &T> {
-        items.iter().skip(self.rank).step_by(self.size)
-    }
-}
-
-/// `message`, serialized for other processes.
-pub(crate) fn encoded(message: &impl Serialize) -> Vec<u8> {
-    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
-}
-
-/// A message that another process has [`encoded`].
-pub(crate) fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> T {
-    postcard::from_bytes(bytes).expect("all processes run the same program")
+    let bytes = postcard::to_extend(&results, vec![]).expect("a vector takes all bytes");
+    drop(results);
+    let decoded = |bytes: Vec<u8>| -> Vec<R> {
+        postcard::from_bytes(&bytes).expect("all processes run the same program")
+    };
+    let of_ranks = ranks.all_gather(&bytes).into_iter();
+    let mut of_ranks: Vec<_> = of_ranks.map(|bytes| decoded(bytes).into_iter()).collect();
+    (0..items.len()).filter_map(|k| of_ranks[k % size].next()).collect()
 }

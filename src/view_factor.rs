@@ -42,7 +42,6 @@ mod ray_rows;
 mod scene_polygons;
 mod shadow_rays;
 mod shaft;
-mod shared_work;
 mod sparse;
 mod tolerances;
 mod unoccluded;
@@ -179,37 +178,6 @@ impl ViewFactors {
             }
         }
         Ok(Some(rows))
-    }
-
-    /// Measures closure, reciprocity and bounds: [`MatrixChecks::of`].
-    pub fn checks(&self) -> MatrixChecks {
-        MatrixChecks::of(self)
-    }
-
-    /// The groups whose enclosure leaks: the share of their flux that hits nothing exceeds three
-    /// standard errors. The most open come first.
-    pub fn open_rows(&self) -> Vec<usize> {
-        checks::open_rows(self)
-    }
-
-    /// The groups whose rows sum to more than one by over three standard errors: they see
-    /// coinciding surfaces, such as a poster in the plane of its wall. The largest sum comes first.
-    pub fn rows_over_unity(&self) -> Vec<usize> {
-        checks::rows_over_unity(self)
-    }
-
-    /// The matrix with reciprocity and closure enforced, and the size of the correction.
-    ///
-    /// First both factors of a pair are set to their mean, weighted by the inverse of their
-    /// variances: A_i F_ij is then a symmetric matrix G. Then G is scaled from both sides, x_i G_ij
-    /// x_j, until every row adds up to A_i: symmetric matrix scaling, which keeps symmetry and
-    /// zeros, makes nothing negative, and minimizes the change of the factors in relative entropy
-    /// (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix scaling", SIAM
-    /// J. Matrix Anal. Appl. 35, 2014). The shares of a row that are open or hit backs are scaled
-    /// with it; an open share within its error of zero is set to zero. No total exceeds 1. The
-    /// change of a factor is added to its error, in squares.
-    pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
-        enforcement::enforce(self)
     }
 }
 

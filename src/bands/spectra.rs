@@ -143,15 +143,14 @@ impl Bands {
                 return wrong(&format!("band {name}"), found, "give one above 0");
             }
         }
-        let (found, wanted) = (self.materials.len(), scene.materials().len());
-        if found != wanted {
-            let remedy = format!("give one for each of the scene's {wanted}");
-            return wrong("materials of bands", format!("{found} of them"), &remedy);
-        }
-        let (found, wanted) = (self.luminaires.len(), scene.luminaires().len());
-        if found != wanted {
-            let remedy = format!("give one for each of the scene's {wanted}");
-            return wrong("luminaires of bands", format!("{found} of them"), &remedy);
+        for (place, found, wanted) in [
+            ("materials of bands", self.materials.len(), scene.materials().len()),
+            ("luminaires of bands", self.luminaires.len(), scene.luminaires().len()),
+        ] {
+            if found != wanted {
+                let remedy = format!("give one for each of the scene's {wanted}");
+                return wrong(place, format!("{found} of them"), &remedy);
+            }
         }
         let luminaires = self.luminaires.iter().map(|values| (values, "luminaire"));
         for (values, place) in

@@ -51,7 +51,8 @@ impl Camera {
         samples: u32,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
+        let GatheredMesh { mesh, surface, .. } = light;
+        let rays = PrimaryRays::new(self, surface, Some(mesh), width, height, samples)?;
         // Bounds the memory for hits, some 10 MiB.
         let bands = rays.bands(width * height, 1 << 16);
         let view = GatheredView::new(LitSurface { rays, light });
@@ -160,9 +161,7 @@ impl GatheredView<'_> {
 
     /// The parts of a range of pixels, in their order.
     fn parts(&self, pixels: Range<u32>) -> Vec<PixelPart> {
-        let parts: Vec<Vec<PixelPart>> =
-            pixels.into_par_iter().map(|k| self.parts_of_pixel(k)).collect();
-        parts.into_iter().flatten().collect()
+        pixels.into_par_iter().flat_map_iter(|k| self.parts_of_pixel(k)).collect()
     }
 
     fn parts_of_pixel(&self, pixel: u32) -> Vec<PixelPart> {

@@ -32,7 +32,8 @@ impl Camera {
         samples: u32,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<RadianceImage>, Error> {
-        let rays = PrimaryRays::of_light(self, light, width, height, samples)?;
+        let GatheredMesh { mesh, surface, .. } = light;
+        let rays = PrimaryRays::new(self, surface, Some(mesh), width, height, samples)?;
         let count = width * height;
         // A tenth of a second on two cores.
         let bands = rays.bands(count, 1 << 18);

@@ -68,6 +68,15 @@ struct Branch {
     history: u64,
 }
 
+/// What becomes of a branch at a boundary, in shares of its weight.
+struct Split {
+    reflected: Rgb,
+    /// Direction, share and bodies of the branch that goes on through it, if one does.
+    through: Option<(DVec3, Rgb, Vec<Medium>)>,
+    /// Weight of the diffuse part.
+    diffuse: Rgb,
+}
+
 /// A hit of a branch on a mirror or glass.
 struct Boundary {
     triangle: usize,
@@ -78,6 +87,31 @@ struct Boundary {
     front: bool,
     /// Of the angle to the normal.
     cosine: f64,
+}
+
+impl Branch {
+    /// The eye for a hit, or its mirror image behind mirrors and glass; `axial` is the cosine of
+    /// the camera's ray to the axis of its view.
+    fn sight(&self, lit: &LitSurface, axial: f64, hit: Option<&Hit>) -> Sight {
+        let Some(hit) = hit.filter(|_| self.history != 0) else { return lit.direct_sight() };
+        let way = (self.length + hit.distance) * self.direction;
+        let at = self.from + hit.distance * self.direction;
+        Sight { eye: at - way, forward: axial * self.direction }
+    }
+}
+
+/// Takes the heaviest of the `pending` branches, the first of equals; none if all together weigh no
+/// more than [`LEFT_OUT`].
+fn take_heaviest(pending: &mut Vec<Branch>) -> Option<Branch> {
+    let heaviness = |branch: &Branch| branch.weight.max_element();
+    if pending.iter().map(heaviness).sum::<f64>() <= LEFT_OUT {
+        return None;
+    }
+    let heavier = |best: usize, k: usize| {
+        if heaviness(&pending[k]) > heaviness(&pending[best]) { k } else { best }
+    };
+    let heaviest = (0..pending.len()).fold(0, heavier);
+    Some(pending.swap_remove(heaviest))
 }
 
 impl SecondPass {
@@ -127,28 +161,12 @@ impl SecondPass {
             history: 0,
         }];
         let (mut all, mut seen_weight) = (vec![], Rgb::ZERO);
-        let heaviness = |branch: &Branch| branch.weight.max_element();
         // Plain choice: between two mirrors of reflectance 0.98 a ray is down to a weight of
         // `LEFT_OUT` after 343.
         for _ in 0..=512 {
-            if pending.iter().map(heaviness).sum::<f64>() <= LEFT_OUT {
-                break;
-            }
-            // The first of equals.
-            let heavier = |best: usize, k: usize| {
-                if heaviness(&pending[k]) > heaviness(&pending[best]) { k } else { best }
-            };
-            let heaviest = (0..pending.len()).fold(0, heavier);
-            let branch = pending.swap_remove(heaviest);
+            let Some(branch) = take_heaviest(&mut pending) else { break };
             let hit = self.next_hit(lit, &branch);
-            let sight = match &hit {
-                Some(hit) if branch.history != 0 => {
-                    let way = (branch.length + hit.distance) * branch.direction;
-                    let at = branch.from + hit.distance * branch.direction;
-                    Sight { eye: at - way, forward: axial * branch.direction }
-                }
-                _ => lit.direct_sight(),
-            };
+            let sight = branch.sight(lit, axial, hit.as_ref());
             let (weight, history) = (branch.weight, branch.history);
             let Some(hit) = hit else {
                 seen_weight += weight;
@@ -232,7 +250,10 @@ impl SecondPass {
         specular: Specular,
         pending: &mut Vec<Branch>,
     ) -> Rgb {
-        let mut add = |direction: DVec3, share: Rgb, media: Vec<Medium>, kind: u64| {
+        let Split { reflected, through, diffuse } = self.split(branch, boundary, specular);
+        let mirrored = (boundary.mirrored(branch), reflected, branch.media.clone());
+        let ways = [Some(mirrored), through].into_iter().flatten();
+        for (kind, (direction, share, media)) in (0..).zip(ways) {
             if share != Rgb::ZERO && branch.weight * share != Rgb::ZERO {
                 let surface = u64::from(self.surfaces[boundary.triangle]);
                 pending.push(Branch {
@@ -244,52 +265,58 @@ impl SecondPass {
                     history: split_mix64(branch.history ^ (2 * surface + kind)).max(1),
                 });
             }
-        };
-        let mut reflect = |share| add(boundary.mirrored(branch), share, branch.media.clone(), 0);
+        }
+        diffuse
+    }
+
+    /// What becomes of `branch` at a boundary.
+    fn split(&self, branch: &Branch, boundary: &Boundary, specular: Specular) -> Split {
+        let from_front = |share| if boundary.front { share } else { Rgb::ZERO };
         match specular {
             Specular::Mirror { reflectance } => {
-                if boundary.front {
-                    reflect(reflectance);
-                }
-                Rgb::ONE
+                Split { reflected: from_front(reflectance), through: None, diffuse: Rgb::ONE }
             }
             Specular::Polished { reflectance } => {
                 let rise = schlick(boundary.cosine);
-                if boundary.front {
-                    reflect(reflectance + (Rgb::ONE - reflectance) * rise);
-                }
-                Rgb::splat(1.0 - rise)
+                let reflected = from_front(reflectance + (Rgb::ONE - reflectance) * rise);
+                Split { reflected, through: None, diffuse: Rgb::splat(1.0 - rise) }
             }
             Specular::Glass { refractive_index, transmittance } => {
-                let index_of = |media: &[Medium]| media.last().map_or(1.0, |m| m.refractive_index);
-                let (ratio, share, media) = match self.glass.faces[boundary.triangle] {
-                    Some(GlassFace::Boundary { body, front_is_outside }) => {
-                        let mut media = branch.media.clone();
-                        if boundary.front == front_is_outside {
-                            media.push(Medium { body, refractive_index });
-                            (refractive_index / index_of(&branch.media), transmittance, media)
-                        } else {
-                            let innermost = media.iter().rposition(|m| m.body == body);
-                            innermost.map(|k| media.remove(k));
-                            (index_of(&media) / refractive_index, Rgb::ONE, media)
-                        }
-                    }
-                    _ => {
-                        let ratio = refractive_index / index_of(&branch.media);
-                        let face = fresnel(boundary.cosine, ratio);
-                        let [reflected, through] = pane(face, transmittance);
-                        reflect(reflected);
-                        add(branch.direction, through, branch.media.clone(), 1);
-                        return Rgb::splat(1.0 - face);
-                    }
-                };
-                let reflected = fresnel(boundary.cosine, ratio);
-                reflect(Rgb::splat(reflected));
-                let through = boundary.refracted(branch, ratio);
-                add(through, (1.0 - reflected) * share, media, 1);
-                Rgb::splat(1.0 - reflected)
+                self.split_at_glass(branch, boundary, refractive_index, transmittance)
             }
         }
+    }
+
+    /// The same at the boundary of a body of glass, or at a pane.
+    fn split_at_glass(
+        &self,
+        branch: &Branch,
+        boundary: &Boundary,
+        refractive_index: f64,
+        transmittance: Rgb,
+    ) -> Split {
+        let index_of = |media: &[Medium]| media.last().map_or(1.0, |m| m.refractive_index);
+        let mut media = branch.media.clone();
+        let Some(GlassFace::Boundary { body, front_is_outside }) =
+            self.glass.faces[boundary.triangle]
+        else {
+            let face = fresnel(boundary.cosine, refractive_index / index_of(&media));
+            let [reflected, through] = pane(face, transmittance);
+            let through = Some((branch.direction, through, media));
+            return Split { reflected, through, diffuse: Rgb::splat(1.0 - face) };
+        };
+        let (ratio, share) = if boundary.front == front_is_outside {
+            media.push(Medium { body, refractive_index });
+            (refractive_index / index_of(&branch.media), transmittance)
+        } else {
+            let innermost = media.iter().rposition(|m| m.body == body);
+            innermost.map(|k| media.remove(k));
+            (index_of(&media) / refractive_index, Rgb::ONE)
+        };
+        let reflected = fresnel(boundary.cosine, ratio);
+        let through = (boundary.refracted(branch, ratio), (1.0 - reflected) * share, media);
+        let diffuse = Rgb::splat(1.0 - reflected);
+        Split { reflected: Rgb::splat(reflected), through: Some(through), diffuse }
     }
 }
 

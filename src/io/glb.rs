@@ -22,7 +22,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
 use gltf_json::mesh::Semantic;
-use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf_json::texture::{Info, MinFilter};
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Index, Material, Value};
 
@@ -192,16 +192,8 @@ impl Model<'_> {
     /// Adds the image of a primitive, repeated or not, smoothly filtered; none without a texture.
     fn add_texture(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Option<Info> {
         let clamped = primitive.shown?.frame()?.clamped;
-        let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
-        let sampler = Sampler {
-            mag_filter: Some(Valid(MagFilter::Linear)),
-            min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
-            wrap_s: wrap,
-            wrap_t: wrap,
-            ..Default::default()
-        };
         let source = Index::new(self.images.number(primitive.material)? as u32);
-        let index = file.add_texture(source, sampler);
+        let index = file.add_texture(source, MinFilter::LinearMipmapLinear, clamped);
         Some(Info { index, tex_coord: 0, extensions: None, extras: None })
     }
 }

@@ -8,44 +8,10 @@
 use crate::scene::{Material, Rgb, Sky, Warning, WarningKind};
 
 /// Words in names of lamps, in lower case.
-const LIGHT_NAMES: [&str; 36] = [
-    "light",
-    "lamp",
-    "emissive",
-    "emission",
-    "emit",
-    "emitter",
-    "emitting",
-    "bulb",
-    "luminaire",
-    "luminous",
-    "luminance",
-    "neon",
-    "glow",
-    "glowing",
-    "led",
-    "lite",
-    "leuchte",
-    "licht",
-    "lampe",
-    "luz",
-    "luce",
-    "lumiere",
-    "lumière",
-    "lampada",
-    "fluorescent",
-    "fluor",
-    "halogen",
-    "sun",
-    "spotlight",
-    "downlight",
-    "uplight",
-    "headlight",
-    "flashlight",
-    "lightbulb",
-    "lightsource",
-    "arealight",
-];
+const LIGHT_NAMES: &str = "\
+    light lamp emissive emission emit emitter emitting bulb luminaire luminous luminance neon \
+    glow glowing led lite leuchte licht lampe luz luce lumiere lumière lampada fluorescent fluor \
+    halogen sun spotlight downlight uplight headlight flashlight lightbulb lightsource arealight";
 
 /// Names of materials that suggest lamps.
 fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -57,7 +23,8 @@ fn candidates<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 fn says_light(word: &str) -> bool {
     let word = word.strip_suffix('s').filter(|one| !one.is_empty()).unwrap_or(word);
     // Or a German compound, such as `Deckenleuchte`.
-    LIGHT_NAMES.contains(&word) || ["leuchte", "lampe"].iter().any(|end| word.ends_with(end))
+    LIGHT_NAMES.split(' ').any(|name| name == word)
+        || ["leuchte", "lampe"].iter().any(|end| word.ends_with(end))
 }
 
 /// The words of a name, in lower case: split at characters other than letters, and before capitals,

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io::Write;
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::write_file;
 use crate::error::Error;
 use crate::geometry::aabb::Aabb;
@@ -39,79 +41,79 @@ pub fn write_ply_with_tone(
     surface: &VertexMesh,
     tone: &ToneCurve,
 ) -> Result<(), Error> {
-    write_file(path.as_ref(), |out| {
-        let irradiances = surface.irradiance.len() == surface.positions.len();
-        let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
-        let (place, light) = (Width::of_positions(surface), Width::of_light(surface, errors));
-        write_header(out, surface, place, "radiosity in W/m2 per channel, linear BT.709")?;
-        for (width, names, known) in [
-            (light, ["radiosity_r", "radiosity_g", "radiosity_b"], true),
-            (light, ["irradiance_r", "irradiance_g", "irradiance_b"], irradiances),
-        ] {
-            for name in names.into_iter().filter(|_| known) {
-                writeln!(out, "property {width} {name}")?;
-            }
+    let irradiances = surface.irradiance.len() == surface.positions.len();
+    // One error per vertex, or none at all.
+    let errors = surface.error.len() == surface.positions.len() && !surface.error.is_empty();
+    let light = Width::of_light(surface, errors);
+    let mut properties = rgb("radiosity").map(|name| (light.to_string(), name)).to_vec();
+    if irradiances {
+        properties.extend(rgb("irradiance").map(|name| (light.to_string(), name)));
+    }
+    properties.extend(colours());
+    properties.extend(errors.then(|| (light.to_string(), "error".into())));
+    let units = "radiosity in W/m2 per channel, linear BT.709";
+    write_mesh(path.as_ref(), surface, units, &properties, |out, v| {
+        light.write_vector(out, surface.radiosity[v])?;
+        if irradiances {
+            // A reflectance close to 0 makes it larger than any float.
+            light.write_vector(out, surface.irradiance[v].min(Rgb::splat(light.most())))?;
         }
-        for name in ["red", "green", "blue"] {
-            writeln!(out, "property uchar {name}")?;
-        }
-        // One error per vertex, or none at all.
-        if errors {
-            writeln!(out, "property {light} error")?;
-        }
-        writeln!(out, "element face {}", surface.faces.len())?;
-        writeln!(out, "property list uchar int vertex_indices\nend_header")?;
-        let vertices = surface.positions.iter().zip(&surface.normals).zip(&surface.radiosity);
-        for (v, ((position, normal), radiosity)) in vertices.enumerate() {
-            for (width, vector) in [(place, position), (Width::Float, normal), (light, radiosity)] {
-                vector.to_array().into_iter().try_for_each(|x| width.write(out, x))?;
-            }
-            if irradiances {
-                // A reflectance close to 0 makes it larger than any float.
-                let irradiance = surface.irradiance[v].min(Rgb::splat(light.most()));
-                irradiance.to_array().into_iter().try_for_each(|x| light.write(out, x))?;
-            }
-            out.write_all(&tone.display(*radiosity))?;
-            if errors {
-                light.write(out, surface.error[v])?;
-            }
-        }
-        write_faces(out, surface)
+        out.write_all(&tone.display(surface.radiosity[v]))?;
+        if errors { light.write(out, surface.error[v]) } else { Ok(()) }
     })
 }
 
-/// Begins a file of `surface`: its comments after that of the `units`, and the properties of
-/// positions, of this width, and normals.
-pub(super) fn write_header(
-    out: &mut dyn Write,
-    surface: &VertexMesh,
-    place: Width,
-    units: &str,
-) -> std::io::Result<()> {
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "comment {units}")?;
-    for comment in &surface.comments {
-        // A header is ASCII, one line per entry.
-        let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
-        writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
-    }
-    writeln!(out, "element vertex {}", surface.positions.len())?;
-    for (width, names) in [(place, ["x", "y", "z"]), (Width::Float, ["nx", "ny", "nz"])] {
-        for name in names {
-            writeln!(out, "property {width} {name}")?;
-        }
-    }
-    Ok(())
+/// Names of the channels of a quantity.
+fn rgb(quantity: &str) -> [String; 3] {
+    ["r", "g", "b"].map(|channel| format!("{quantity}_{channel}"))
 }
 
-pub(super) fn write_faces(out: &mut dyn Write, surface: &VertexMesh) -> std::io::Result<()> {
-    for face in &surface.faces {
-        out.write_all(&[3])?;
-        for v in face {
-            out.write_all(&v.to_le_bytes())?;
+/// The properties of colours for viewers.
+pub(super) fn colours() -> [Property; 3] {
+    ["red", "green", "blue"].map(|name| ("uchar".into(), name.into()))
+}
+
+/// Type and name of a property of vertices.
+pub(super) type Property = (String, String);
+
+/// Writes `surface`: its comments after that of the `units`, its vertices with positions, normals
+/// and these `properties`, which `vertex` writes, and its faces.
+pub(super) fn write_mesh(
+    path: &Path,
+    surface: &VertexMesh,
+    units: &str,
+    properties: &[Property],
+    vertex: impl Fn(&mut dyn Write, usize) -> std::io::Result<()>,
+) -> Result<(), Error> {
+    let place = Width::of_positions(surface);
+    write_file(path, |out| {
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        writeln!(out, "comment {units}")?;
+        for comment in &surface.comments {
+            // A header is ASCII, one line per entry.
+            let plain = |c: char| if c.is_ascii() && !c.is_ascii_control() { c } else { ' ' };
+            writeln!(out, "comment {}", comment.chars().map(plain).collect::<String>())?;
         }
-    }
-    Ok(())
+        writeln!(out, "element vertex {}", surface.positions.len())?;
+        for (width, names) in [(place, ["x", "y", "z"]), (Width::Float, ["nx", "ny", "nz"])] {
+            names.iter().try_for_each(|name| writeln!(out, "property {width} {name}"))?;
+        }
+        for (kind, name) in properties {
+            writeln!(out, "property {kind} {name}")?;
+        }
+        writeln!(out, "element face {}", surface.faces.len())?;
+        writeln!(out, "property list uchar int vertex_indices\nend_header")?;
+        for (v, (position, normal)) in surface.positions.iter().zip(&surface.normals).enumerate() {
+            place.write_vector(out, *position)?;
+            Width::Float.write_vector(out, *normal)?;
+            vertex(out, v)?;
+        }
+        for face in &surface.faces {
+            out.write_all(&[3])?;
+            face.iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))?;
+        }
+        Ok(())
+    })
 }
 
 /// Numbers of 32 or 64 bits.
@@ -123,7 +125,7 @@ pub(super) enum Width {
 
 impl Width {
     /// Floats, if their steps are below a millionth of the mesh's size.
-    pub fn of_positions(surface: &VertexMesh) -> Width {
+    fn of_positions(surface: &VertexMesh) -> Width {
         let bounds = Aabb::from_points(surface.positions.iter().copied());
         let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
         Width::of(largest, largest <= 16.0 * bounds.longest_side())
@@ -147,6 +149,10 @@ impl Width {
             Width::Float => f64::from(f32::MAX),
             Width::Double => f64::MAX,
         }
+    }
+
+    fn write_vector(self, out: &mut dyn Write, vector: DVec3) -> std::io::Result<()> {
+        vector.to_array().into_iter().try_for_each(|x| self.write(out, x))
     }
 
     pub fn write(self, out: &mut dyn Write, x: f64) -> std::io::Result<()> {

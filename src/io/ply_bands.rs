@@ -1,10 +1,8 @@
 //! PLY output with a property for each band.
 
-use std::io::Write;
 use std::path::Path;
 
-use super::ply::{Width, write_faces, write_header};
-use super::write_file;
+use super::ply::{self, Property, Width, write_mesh};
 use crate::bands::BandLight;
 use crate::error::Error;
 use crate::io::tone::ToneCurve;
@@ -33,32 +31,19 @@ pub fn write_ply_bands(
     let columns = [("radiosity", radiosity), ("irradiance", irradiance), ("error", noise)];
     let brightest = columns.iter().flat_map(|(_, values)| values.iter().copied());
     let width = Width::of(brightest.fold(0.0, f64::max), true);
-    let place = Width::of_positions(surface);
-    write_file(path.as_ref(), |out| {
-        write_header(out, surface, place, "radiosity in W/m2, or W/(m2 nm), by band")?;
-        for band in bands {
-            for (name, _) in columns {
-                writeln!(out, "property {width} {name}_{}", band.name)?;
-            }
+    let names = bands.iter().flat_map(|b| columns.map(|(name, _)| format!("{name}_{}", b.name)));
+    let mut properties: Vec<Property> = names.map(|name| (width.to_string(), name)).collect();
+    if colours.is_some() {
+        properties.extend(ply::colours());
+    }
+    let units = "radiosity in W/m2, or W/(m2 nm), by band";
+    write_mesh(path.as_ref(), surface, units, &properties, |out, v| {
+        for b in v * bands.len()..(v + 1) * bands.len() {
+            columns.iter().try_for_each(|(_, values)| width.write(out, values[b]))?;
         }
-        for name in ["red", "green", "blue"].iter().filter(|_| colours.is_some()) {
-            writeln!(out, "property uchar {name}")?;
+        match &colours {
+            Some(colours) => out.write_all(&tone.display(colours[v])),
+            None => Ok(()),
         }
-        writeln!(out, "element face {}", surface.faces.len())?;
-        writeln!(out, "property list uchar int vertex_indices\nend_header")?;
-        for (v, (position, normal)) in surface.positions.iter().zip(&surface.normals).enumerate() {
-            for (width, vector) in [(place, position), (Width::Float, normal)] {
-                vector.to_array().into_iter().try_for_each(|x| width.write(out, x))?;
-            }
-            for b in 0..bands.len() {
-                for (_, values) in columns {
-                    width.write(out, values[v * bands.len() + b])?;
-                }
-            }
-            if let Some(colours) = &colours {
-                out.write_all(&tone.display(colours[v]))?;
-            }
-        }
-        write_faces(out, surface)
     })
 }

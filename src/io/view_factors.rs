@@ -33,13 +33,12 @@ pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<
             let mut row = matrix.factors[i].iter().peekable();
             for j in 0..names.len() as u32 {
                 match row.next_if(|f| f.to == j) {
-                    Some(f) => write!(out, ",{}", RoundedValue::of(f.value))?,
+                    Some(f) => write!(out, ",{}", rounded(f.value).0)?,
                     None if matrix.absent == Missing::Zero => write!(out, ",0")?,
                     None => write!(out, ",")?,
                 }
             }
-            let [open, back] =
-                [&matrix.open[i], &matrix.back[i]].map(|e| RoundedValue::of(e.value));
+            let [open, back] = [&matrix.open[i], &matrix.back[i]].map(|e| rounded(e.value).0);
             writeln!(out, ",{open},{back},{}", matrix.areas[i])?;
         }
         Ok(())
@@ -61,18 +60,11 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
             let area = matrix.areas[i];
             for f in &matrix.factors[i] {
                 let (to, other) = (&names[f.to as usize], matrix.areas[f.to as usize]);
-                let printed = RoundedValue::of(f.value);
-                writeln!(
-                    out,
-                    "{name},{to},{printed},{:.2e},{area},{other}",
-                    printed.error(f.error)
-                )?;
+                let factor = with_error(Estimate { value: f.value, error: f.error });
+                writeln!(out, "{name},{to},{factor},{area},{other}")?;
             }
-            for (to, Estimate { value, error }) in
-                [("open", matrix.open[i]), ("back", matrix.back[i])]
-            {
-                let printed = RoundedValue::of(value);
-                writeln!(out, "{name},{to},{printed},{:.2e},{area},", printed.error(error))?;
+            for (to, share) in [("open", matrix.open[i]), ("back", matrix.back[i])] {
+                writeln!(out, "{name},{to},{},{area},", with_error(share))?;
             }
         }
         Ok(())
@@ -145,34 +137,19 @@ pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Resu
     })
 }
 
-/// A value with nine decimals, or five digits if it is small.
-struct RoundedValue {
-    text: String,
-    /// Of the last digit.
-    unit: f64,
+/// A value with nine decimals, or five digits if it is small, and the unit of its last digit.
+fn rounded(value: f64) -> (String, f64) {
+    if value.abs() >= 1e-5 || value == 0.0 {
+        return (format!("{value:.9}"), 1e-9);
+    }
+    (format!("{value:.4e}"), 1e-4 * 10f64.powf(value.abs().log10().floor()))
 }
 
-impl RoundedValue {
-    fn of(value: f64) -> RoundedValue {
-        if value.abs() >= 1e-5 || value == 0.0 {
-            return RoundedValue { text: format!("{value:.9}"), unit: 1e-9 };
-        }
-        RoundedValue {
-            text: format!("{value:.4e}"),
-            unit: 1e-4 * 10f64.powf(value.abs().log10().floor()),
-        }
-    }
-
-    /// `error` and that of rounding: a uniform distribution over one unit of the last digit.
-    fn error(&self, error: f64) -> f64 {
-        error.hypot(self.unit / 12f64.sqrt())
-    }
-}
-
-impl std::fmt::Display for RoundedValue {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.text)
-    }
+/// A value and its error with that of rounding: a uniform distribution over one unit of the last
+/// digit.
+fn with_error(Estimate { value, error }: Estimate) -> String {
+    let (text, unit) = rounded(value);
+    format!("{text},{:.2e}", error.hypot(unit / 12f64.sqrt()))
 }
 
 /// A CSV field (RFC 4180): quoted if it contains a comma, quote or line break.

@@ -99,62 +99,14 @@ impl LightMap {
     /// texels, in proportion to the cells' contrast. Each represents the area over the density of
     /// both halves (Veach and Guibas 1995, the balance heuristic).
     fn shown_points(&self) -> Vec<ShownPoint> {
-        let scene = self.atlas.scene();
-        let areas = (0..scene.triangles().len()).map(|t| match scene.material(t).scatters() {
-            true => scene.area(t),
-            false => 0.0,
-        });
-        let surface = AreaSampler::new(areas);
-        let contrasts = self.contrasts();
-        let cells = AreaSampler::new(contrasts.iter().copied());
+        let points = PointSampler::new(self);
         let gathered = self.gathered.iter().filter(|&&gathered| gathered).count();
         // With two gathers per point, a sixteenth of the work of the texels.
         let count = (gathered / 32).clamp(2048, 16384) / 2;
-        let texels = TexelPoints::new(&self.atlas);
-        let (offset, rotations) = (SurfaceOffset::new(scene), CellRotation::new(&scene.bounds()));
-        let point = |(t, barycentric): (usize, [f64; 2])| {
-            let [u, v] = barycentric;
-            if !scene.material(t).scatters() {
-                return None;
-            }
-            scene.first_solid(t, std::iter::once(barycentric))?;
-            let position = self.atlas.texel_position(t, barycentric);
-            let texel = texels.texel_size(t);
-            let share = match self.triangles_of_cell(position).contains(&(t as u32)) {
-                true => contrasts[self.cell(position)] / cells.total_area().max(f64::MIN_POSITIVE),
-                false => 0.0,
-            };
-            let density = 1.0 / surface.total_area() + share / (texel * texel);
-            let [a, b, c] = scene.corners(t);
-            let position = a * (1.0 - u - v) + b * u + c * v;
-            // Next to a side, another surface may be nearer than the near distance for this size.
-            let inset = 3.0 * u.min(v).min(1.0 - u - v) * scene.area(t).sqrt();
-            let size = texel.min(inset);
-            let point = offset.gather_point(position, scene.normal(t), size);
-            let point = TwoSidedPoint::new(point, scene.material(t));
-            let inward = [a, b, c].iter().sum::<DVec3>() / 3.0 - position;
-            let turn = rotations.at(point.point.position, point.point.near);
-            let beside = point.beside(inward, size, turn);
-            let albedo = scene.material(t).albedo();
-            let shown = albedo * self.irradiance_at(t, barycentric);
-            Some(ShownPoint { points: [point, beside], albedo, shown, area: 1.0 / density })
-        };
-        let even = surface.spread(count, 0.5).map(|at| (at.triangle, at.barycentric));
-        let even: Vec<ShownPoint> = even.filter_map(point).collect();
-        let in_cell = |k: usize| {
-            let (cell, _) = cells.locate((k as f64 + 0.5) / count as f64);
-            let corner = [cell as u32 % self.atlas.width(), cell as u32 / self.atlas.width()];
-            let position = DVec2::from(corner.map(f64::from)) + DVec2::from(r2_point(k, 0.5));
-            let on_triangle = |&t: &u32| {
-                let [a, b, c] = self.atlas.corners(t as usize).map(|p| p.extend(0.0));
-                let [u, v] = barycentric([a, b, c], DVec3::Z, position.extend(0.0));
-                let is_inside = u.min(v).min(1.0 - u - v) >= 0.0;
-                is_inside.then_some((t as usize, [u, v]))
-            };
-            point(self.triangles_of_cell(position).iter().find_map(on_triangle)?)
-        };
-        let count = if cells.total_area() > 0.0 { count } else { 0 };
-        even.into_iter().chain((0..count).filter_map(in_cell)).collect()
+        let even = points.surface.spread(count, 0.5);
+        let even = even.filter_map(|at| points.point(at.triangle, at.barycentric));
+        let in_cells = if points.cells.total_area() > 0.0 { count } else { 0 };
+        even.chain((0..in_cells).filter_map(|k| points.in_cell(k, count))).collect()
     }
 
     /// The upper left texel of the cell around a point `position` in units of texels.
@@ -192,6 +144,89 @@ impl LightMap {
             (high - low) / low.max(floor)
         };
         (0..width * height).map(contrast).collect()
+    }
+}
+
+/// The densities of points at which a map is measured.
+struct PointSampler<'a> {
+    map: &'a LightMap,
+    /// The reflecting surfaces, by area.
+    surface: AreaSampler,
+    /// [`LightMap::contrasts`], and the cells between texels in proportion to them.
+    contrasts: Vec<f64>,
+    cells: AreaSampler,
+    texels: TexelPoints<'a>,
+    offset: SurfaceOffset,
+    rotations: CellRotation,
+}
+
+impl PointSampler<'_> {
+    fn new(map: &LightMap) -> PointSampler<'_> {
+        let scene = map.atlas.scene();
+        let areas = (0..scene.triangles().len()).map(|t| match scene.material(t).scatters() {
+            true => scene.area(t),
+            false => 0.0,
+        });
+        let contrasts = map.contrasts();
+        PointSampler {
+            map,
+            surface: AreaSampler::new(areas),
+            cells: AreaSampler::new(contrasts.iter().copied()),
+            contrasts,
+            texels: TexelPoints::new(&map.atlas),
+            offset: SurfaceOffset::new(scene),
+            rotations: CellRotation::new(&scene.bounds()),
+        }
+    }
+
+    /// The point of triangle `t` with these weights of the second and third corner; none where
+    /// nothing reflects.
+    fn point(&self, t: usize, barycentric: [f64; 2]) -> Option<ShownPoint> {
+        let (map, scene, [u, v]) = (self.map, self.map.atlas.scene(), barycentric);
+        if !scene.material(t).scatters() {
+            return None;
+        }
+        scene.first_solid(t, std::iter::once(barycentric))?;
+        let position = map.atlas.texel_position(t, barycentric);
+        let texel = self.texels.texel_size(t);
+        let share = match map.triangles_of_cell(position).contains(&(t as u32)) {
+            true => {
+                let all = self.cells.total_area().max(f64::MIN_POSITIVE);
+                self.contrasts[map.cell(position)] / all
+            }
+            false => 0.0,
+        };
+        let density = 1.0 / self.surface.total_area() + share / (texel * texel);
+        let [a, b, c] = scene.corners(t);
+        let position = a * (1.0 - u - v) + b * u + c * v;
+        // Next to a side, another surface may be nearer than the near distance for this size.
+        let inset = 3.0 * u.min(v).min(1.0 - u - v) * scene.area(t).sqrt();
+        let size = texel.min(inset);
+        let point = self.offset.gather_point(position, scene.normal(t), size);
+        let point = TwoSidedPoint::new(point, scene.material(t));
+        let inward = [a, b, c].iter().sum::<DVec3>() / 3.0 - position;
+        let turn = self.rotations.at(point.point.position, point.point.near);
+        let beside = point.beside(inward, size, turn);
+        let albedo = scene.material(t).albedo();
+        let shown = albedo * map.irradiance_at(t, barycentric);
+        Some(ShownPoint { points: [point, beside], albedo, shown, area: 1.0 / density })
+    }
+
+    /// Point `k` of `count` in the cells between texels, if a surface is there.
+    fn in_cell(&self, k: usize, count: usize) -> Option<ShownPoint> {
+        let atlas = &self.map.atlas;
+        let (cell, _) = self.cells.locate((k as f64 + 0.5) / count as f64);
+        let corner = [cell as u32 % atlas.width(), cell as u32 / atlas.width()];
+        let position = DVec2::from(corner.map(f64::from)) + DVec2::from(r2_point(k, 0.5));
+        let on_triangle = |&t: &u32| {
+            let [a, b, c] = atlas.corners(t as usize).map(|p| p.extend(0.0));
+            let [u, v] = barycentric([a, b, c], DVec3::Z, position.extend(0.0));
+            let is_inside = u.min(v).min(1.0 - u - v) >= 0.0;
+            is_inside.then_some((t as usize, [u, v]))
+        };
+        let triangles = self.map.triangles_of_cell(position);
+        let (t, barycentric) = triangles.iter().find_map(on_triangle)?;
+        self.point(t, barycentric)
     }
 }
 

@@ -22,7 +22,7 @@ use super::pair_visibility::PairVisibility;
 use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::scene_polygons::ScenePolygons;
-use super::shared_work::share_out;
+use crate::ranks::share_out;
 use crate::sampling::hash::split_mix64;
 
 /// Computes the rows of the polygons `wanted`; `None` if stopped.
@@ -106,16 +106,16 @@ impl Assembler {
             start..start + count
         };
         let to_group = |to: usize| {
-            let mut sum = EstimateSum::default();
             let mut visibility = PointVisibility::default();
-            for s in polygons(group) {
+            let flux = |s: usize| {
                 let from = &self.fronts[s];
                 let share = self.bound_share(from.area, group);
                 let tolerance = share * self.areas[group].min(self.areas[to]);
                 let receivers = polygons(to).filter(|t| *t != s);
                 let receivers = receivers.map(|t| (&self.fronts[t], t));
-                sum.add(self.flux(s, receivers, tolerance, &mut visibility), 1.0);
-            }
+                self.flux(s, receivers, tolerance, &mut visibility)
+            };
+            let sum = Estimate::sum(polygons(group).map(flux));
             let Estimate { value, error } = sum.over(self.areas[group]);
             Factor { to: to as u32, value, error }
         };
@@ -150,24 +150,5 @@ impl Assembler {
             value: unoccluded.value + occluded.value,
             error: unoccluded.error.hypot(occluded.error),
         }
-    }
-}
-
-/// A sum of independent estimates.
-#[derive(Clone, Copy, Default)]
-struct EstimateSum {
-    value: f64,
-    squared_error: f64,
-}
-
-impl EstimateSum {
-    fn add(&mut self, term: Estimate, factor: f64) {
-        self.value += factor * term.value;
-        self.squared_error += (factor * term.error).powi(2);
-    }
-
-    /// The sum divided by `area`.
-    fn over(self, area: f64) -> Estimate {
-        Estimate { value: self.value, error: self.squared_error.sqrt() }.over(area)
     }
 }

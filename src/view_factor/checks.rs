@@ -61,15 +61,33 @@ impl ErrorStats {
     }
 }
 
-impl MatrixChecks {
-    /// Measures closure, reciprocity and bounds of `matrix`.
-    pub fn of(matrix: &ViewFactors) -> MatrixChecks {
+impl ViewFactors {
+    /// Measures closure, reciprocity and bounds.
+    pub fn checks(&self) -> MatrixChecks {
         MatrixChecks {
-            closure: ErrorStats::of(closure_errors(matrix)),
-            reciprocity: ErrorStats::of(reciprocity_errors(matrix)),
-            bounds: ErrorStats::of(bound_errors(matrix)),
-            row_sums: ErrorStats::of(row_excesses(matrix)),
+            closure: ErrorStats::of(closure_errors(self)),
+            reciprocity: ErrorStats::of(reciprocity_errors(self)),
+            bounds: ErrorStats::of(bound_errors(self)),
+            row_sums: ErrorStats::of(row_excesses(self)),
         }
+    }
+
+    /// The groups whose enclosure leaks: the share of their flux that hits nothing exceeds three
+    /// standard errors. The most open come first.
+    pub fn open_rows(&self) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..self.open.len()).filter(|&i| !is_closed(self, i)).collect();
+        rows.sort_by(|&i, &j| self.open[j].value.total_cmp(&self.open[i].value).then(i.cmp(&j)));
+        rows
+    }
+
+    /// The groups whose rows sum to more than one by over three standard errors: they see
+    /// coinciding surfaces, such as a poster in the plane of its wall. The largest sum comes first.
+    pub fn rows_over_unity(&self) -> Vec<usize> {
+        let excess = |i: usize| -self.open[i].value;
+        let is_over = |i: &usize| excess(*i) > open_tolerance(self, *i);
+        let mut rows: Vec<usize> = (0..self.open.len()).filter(is_over).collect();
+        rows.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
+        rows
     }
 }
 
@@ -116,20 +134,4 @@ fn open_tolerance(m: &ViewFactors, i: usize) -> f64 {
 /// Whether the open share of group `i` is zero within its error, or below.
 pub(super) fn is_closed(m: &ViewFactors, i: usize) -> bool {
     m.open[i].value <= open_tolerance(m, i)
-}
-
-/// The groups that are not closed, the most open first.
-pub(super) fn open_rows(m: &ViewFactors) -> Vec<usize> {
-    let mut rows: Vec<usize> = (0..m.open.len()).filter(|&i| !is_closed(m, i)).collect();
-    rows.sort_by(|&i, &j| m.open[j].value.total_cmp(&m.open[i].value).then(i.cmp(&j)));
-    rows
-}
-
-/// The groups whose rows sum to more than one beyond their error, the largest sum first.
-pub(super) fn rows_over_unity(m: &ViewFactors) -> Vec<usize> {
-    let excess = |i: usize| -m.open[i].value;
-    let is_over = |i: &usize| excess(*i) > open_tolerance(m, *i);
-    let mut rows: Vec<usize> = (0..m.open.len()).filter(is_over).collect();
-    rows.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
-    rows
 }

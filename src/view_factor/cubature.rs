@@ -20,7 +20,7 @@
 //! change due to the last cut. Errors of cells are independent (cuts are jittered), so their
 //! squares add up.
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
@@ -228,34 +228,15 @@ impl Cell {
     }
 }
 
-/// A cell to be cut, the largest error bound first; ties go by number, so that the order is the
-/// same on every run.
-struct HeapEntry {
-    error_bound: f64,
-    pair: usize,
-    cell: usize,
-}
+/// A cell to be cut by its error bound, whose bits have the order of the bound since that is not
+/// negative; ties go by pair and cell, so that the order is the same on every run.
+type HeapEntry = (u64, Reverse<(usize, usize)>);
 
-impl Ord for HeapEntry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let order = self.error_bound.total_cmp(&other.error_bound);
-        order.then_with(|| (other.pair, other.cell).cmp(&(self.pair, self.cell)))
+impl Cell {
+    fn in_heap(&self, pair: usize, cell: usize) -> HeapEntry {
+        (self.error_bound.to_bits(), Reverse((pair, cell)))
     }
 }
-
-impl PartialOrd for HeapEntry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for HeapEntry {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for HeapEntry {}
 
 /// Sums over cells of the squares of their errors.
 #[derive(Default)]
@@ -293,22 +274,19 @@ pub(super) fn integrate_adaptively(
     for (pair, occluded) in pairs.iter().enumerate() {
         for (index, cell) in occluded.cells.iter().enumerate() {
             squared_errors.add(cell);
-            heap.push(HeapEntry { error_bound: cell.error_bound, pair, cell: index });
+            heap.push(cell.in_heap(pair, index));
         }
     }
     // Limits time and memory; the remaining error is reported.
     while !squared_errors.are_within(tolerance) && heap.len() < 40_000 {
-        let Some(HeapEntry { error_bound, pair, cell }) = heap.pop() else { break };
-        if error_bound == 0.0 {
-            break;
-        }
+        let Some((1.., Reverse((pair, cell)))) = heap.pop() else { break };
         let occluded = &mut pairs[pair];
         squared_errors.remove(&occluded.cells[cell]);
         let parts = occluded.cells[cell].split(occluded, visibility);
         for (k, part) in parts.into_iter().enumerate() {
             squared_errors.add(&part);
             let index = if k == 0 { cell } else { occluded.cells.len() };
-            heap.push(HeapEntry { error_bound: part.error_bound, pair, cell: index });
+            heap.push(part.in_heap(pair, index));
             if k == 0 {
                 occluded.cells[cell] = part;
             } else {

@@ -29,47 +29,60 @@ pub struct EnforcementReport {
     pub closure_left: f64,
 }
 
-/// [`ViewFactors::enforced`].
-pub(super) fn enforce(matrix: &ViewFactors) -> (ViewFactors, EnforcementReport) {
-    let n = matrix.areas.len();
-    let closed: Vec<bool> = (0..n).map(|i| is_closed(matrix, i)).collect();
-    let mut exchange = symmetric_exchange(matrix);
-    let lost: Vec<f64> = (0..n).map(|i| lost_exchange(matrix, i, closed[i])).collect();
-    let x = scaling(&exchange, &lost, &matrix.areas);
-    exchange.par_iter_mut().enumerate().for_each(|(i, row)| {
-        row.iter_mut().for_each(|(j, area)| *area *= x[i] * x[*j as usize]);
-    });
-    let row_total = |i: usize| (row_sum(&exchange[i], |_| 1.0) + x[i] * lost[i]) / matrix.areas[i];
-    let totals: Vec<f64> = (0..n).into_par_iter().map(row_total).collect();
-    // Below 1 by the rounding of a sum, so that it is not above 1 in any order of summation.
-    let largest_total =
-        totals.iter().copied().fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
-    let closure_left = totals.iter().map(|total| (total - 1.0).abs()).fold(0.0, f64::max);
-    let scaled_row = |(i, row): (usize, &ExchangeRow)| {
-        let of_area = |&(j, area): &(u32, f64)| (j, area / matrix.areas[i] / largest_total);
-        changed_row(&matrix.factors[i], row.iter().map(of_area))
-    };
-    let rows: Vec<ChangedRow> = exchange.par_iter().enumerate().map(scaled_row).collect();
-    let count = rows.iter().map(|row| row.factors.len()).sum::<usize>() as f64;
-    let sum_of_squares: f64 = rows.iter().map(|row| row.sum_of_squares).sum();
-    let rms_change = if count > 0.0 { f64::sqrt(sum_of_squares / count) } else { 0.0 };
-    let max_change = rows.iter().map(|row| row.max_change).fold(0.0, f64::max);
-    let mut enforced = ViewFactors {
-        names: matrix.names.clone(),
-        areas: matrix.areas.clone(),
-        factors: rows.into_iter().map(|row| row.factors).collect(),
-        open: matrix.open.clone(),
-        back: matrix.back.clone(),
-        absent: matrix.absent,
-    };
-    for i in 0..n {
-        let scale = x[i] / largest_total;
-        enforced.back[i].value = (matrix.back[i].value * scale).max(0.0);
-        let open = if closed[i] { 0.0 } else { (matrix.open[i].value * scale).max(0.0) };
-        enforced.open[i].value = open;
+impl ViewFactors {
+    /// The matrix with reciprocity and closure enforced, and the size of the correction.
+    ///
+    /// First both factors of a pair are set to their mean, weighted by the inverse of their
+    /// variances: A_i F_ij is then a symmetric matrix G. Then G is scaled from both sides, x_i G_ij
+    /// x_j, until every row adds up to A_i: symmetric matrix scaling, which keeps symmetry and
+    /// zeros, makes nothing negative, and minimizes the change of the factors in relative entropy
+    /// (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix scaling", SIAM
+    /// J. Matrix Anal. Appl. 35, 2014). The shares of a row that are open or hit backs are scaled
+    /// with it; an open share within its error of zero is set to zero. No total exceeds 1. The
+    /// change of a factor is added to its error, in squares.
+    pub fn enforced(&self) -> (ViewFactors, EnforcementReport) {
+        let matrix = self;
+        let n = matrix.areas.len();
+        let closed: Vec<bool> = (0..n).map(|i| is_closed(matrix, i)).collect();
+        let mut exchange = symmetric_exchange(matrix);
+        let lost: Vec<f64> = (0..n).map(|i| lost_exchange(matrix, i, closed[i])).collect();
+        let x = scaling(&exchange, &lost, &matrix.areas);
+        exchange.par_iter_mut().enumerate().for_each(|(i, row)| {
+            row.iter_mut().for_each(|(j, area)| *area *= x[i] * x[*j as usize]);
+        });
+        let row_total =
+            |i: usize| (row_sum(&exchange[i], |_| 1.0) + x[i] * lost[i]) / matrix.areas[i];
+        let totals: Vec<f64> = (0..n).into_par_iter().map(row_total).collect();
+        // Below 1 by the rounding of a sum, so that it is not above 1 in any order of summation.
+        let largest_total =
+            totals.iter().copied().fold(1.0, f64::max) * (1.0 + f64::EPSILON * n as f64);
+        let closure_left = totals.iter().map(|total| (total - 1.0).abs()).fold(0.0, f64::max);
+        let scaled_row = |(i, row): (usize, &ExchangeRow)| {
+            let of_area = |&(j, area): &(u32, f64)| (j, area / matrix.areas[i] / largest_total);
+            changed_row(&matrix.factors[i], row.iter().map(of_area))
+        };
+        let rows: Vec<ChangedRow> = exchange.par_iter().enumerate().map(scaled_row).collect();
+        let count = rows.iter().map(|row| row.factors.len()).sum::<usize>() as f64;
+        let sum_of_squares: f64 = rows.iter().map(|row| row.sum_of_squares).sum();
+        let rms_change = if count > 0.0 { f64::sqrt(sum_of_squares / count) } else { 0.0 };
+        let max_change = rows.iter().map(|row| row.max_change).fold(0.0, f64::max);
+        let mut enforced = ViewFactors {
+            names: matrix.names.clone(),
+            areas: matrix.areas.clone(),
+            factors: rows.into_iter().map(|row| row.factors).collect(),
+            open: matrix.open.clone(),
+            back: matrix.back.clone(),
+            absent: matrix.absent,
+        };
+        for i in 0..n {
+            let scale = x[i] / largest_total;
+            enforced.back[i].value = (matrix.back[i].value * scale).max(0.0);
+            let open = if closed[i] { 0.0 } else { (matrix.open[i].value * scale).max(0.0) };
+            enforced.open[i].value = open;
+        }
+        let closed_rows = closed.iter().filter(|c| **c).count();
+        (enforced, EnforcementReport { rms_change, max_change, closed_rows, closure_left })
     }
-    let closed_rows = closed.iter().filter(|c| **c).count();
-    (enforced, EnforcementReport { rms_change, max_change, closed_rows, closure_left })
 }
 
 /// The exchange area of group `i` with the open and with backs.

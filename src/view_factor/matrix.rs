@@ -65,6 +65,21 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// The sum of independent estimates: squares of errors add up.
+    pub(super) fn sum(terms: impl IntoIterator<Item = Estimate>) -> Estimate {
+        let (mut value, mut squares) = (0.0, 0.0);
+        for term in terms {
+            value += term.value;
+            squares += term.error.powi(2);
+        }
+        Estimate { value, error: squares.sqrt() }
+    }
+
+    /// Both multiplied by `factor`.
+    pub(super) fn times(self, factor: f64) -> Estimate {
+        Estimate { value: factor * self.value, error: factor * self.error }
+    }
+
     /// Both divided by `area`; zero if that is zero: a group without area neither emits nor
     /// receives.
     pub(super) fn over(self, area: f64) -> Estimate {

@@ -93,25 +93,6 @@ impl FacingPair {
         rank(&self.a, self.a_normal) <= rank(&self.b, self.b_normal)
     }
 
-    /// Their mutual visibility with all blockers `between`, clipped to their shaft; `seed` makes
-    /// cuts differ from pair to pair.
-    pub fn past(
-        self,
-        between: &[Blocker],
-        visibility: &mut PointVisibility,
-        seed: u64,
-    ) -> PairVisibility {
-        if between.is_empty() {
-            return PairVisibility::Unoccluded(self.unoccluded());
-        }
-        if between.iter().any(|blocker| fully_occludes(blocker, &self.a, &self.b)) {
-            return PairVisibility::Hidden;
-        }
-        let pair = if self.is_better_from_a(between) { self } else { self.swapped() };
-        let occluded = pair.occluded_from_a(between, visibility, seed);
-        PairVisibility::Occluded(Box::new(occluded))
-    }
-
     /// The pair with the domain `a` cut into cells: between the planes of the blockers that stand
     /// on it, then into triangles.
     fn occluded_from_a(
@@ -151,7 +132,14 @@ impl PairVisibility {
     ) -> PairVisibility {
         let Some(pair) = FacingPair::new(s, t) else { return PairVisibility::Hidden };
         let between = blockers.within(&pair.shaft());
-        pair.past(&between, visibility, seed)
+        if between.is_empty() {
+            return PairVisibility::Unoccluded(pair.unoccluded());
+        }
+        if between.iter().any(|blocker| fully_occludes(blocker, &pair.a, &pair.b)) {
+            return PairVisibility::Hidden;
+        }
+        let pair = if pair.is_better_from_a(&between) { pair } else { pair.swapped() };
+        PairVisibility::Occluded(Box::new(pair.occluded_from_a(&between, visibility, seed)))
     }
 }
 

@@ -72,6 +72,10 @@ impl Exchange {
     pub fn new(to: u32, of: Estimate) -> Exchange {
         Exchange { to, value: of.value, error: of.error as f32 }
     }
+
+    pub fn estimate(&self) -> Estimate {
+        Estimate { value: self.value, error: self.error.into() }
+    }
 }
 
 /// Rows being computed, and their progress callback.
@@ -191,26 +195,23 @@ impl PartialMatrix {
         let mut back = vec![Estimate::default(); areas.len()];
         let mut rows = self.rows.into_iter().zip(&self.groups).peekable();
         for i in 0..areas.len() {
-            // Of all polygons of group i: by group, value and squared error.
-            let (mut sums, mut to_back) = (vec![], (0.0, 0.0));
+            // Of all polygons of group i.
+            let (mut to_fronts, mut to_backs) = (vec![], vec![]);
             while let Some((row, _)) = rows.next_if(|(_, group)| **group as usize == i) {
                 let PolygonRow { fronts, back } = row.unwrap_or_default();
-                for Exchange { to, error, value } in fronts {
-                    // Pairs within a group are computed once and count both ways.
-                    let ways = if i == to as usize { 2.0 } else { 1.0 };
-                    sums.push((to, ways * value, (ways * f64::from(error)).powi(2)));
-                }
-                to_back.0 += back.value;
-                to_back.1 += f64::from(back.error).powi(2);
+                to_fronts.extend(fronts);
+                to_backs.push(back.estimate());
             }
-            back[i] = Estimate { value: to_back.0, error: f64::sqrt(to_back.1) }.over(areas[i]);
-            sums.sort_by_key(|(j, ..)| *j);
-            for of_group in sums.chunk_by(|a, b| a.0 == b.0) {
-                let to = of_group[0].0;
-                let value = of_group.iter().map(|(_, value, _)| value).sum();
-                let error = of_group.iter().map(|(.., square)| square).sum::<f64>().sqrt();
+            back[i] = Estimate::sum(to_backs).over(areas[i]);
+            to_fronts.sort_by_key(|exchange| exchange.to);
+            for of_group in to_fronts.chunk_by(|a, b| a.to == b.to) {
+                let to = of_group[0].to;
+                // Pairs within a group are computed once and count both ways.
+                let ways = if i == to as usize { 2.0 } else { 1.0 };
+                let both_ways = |exchange: &Exchange| exchange.estimate().times(ways);
+                let sum = Estimate::sum(of_group.iter().map(both_ways));
                 let mut push = |from: usize, to: u32| {
-                    let Estimate { value, error } = Estimate { value, error }.over(areas[from]);
+                    let Estimate { value, error } = sum.over(areas[from]);
                     factors[from].push(Factor { to, value, error });
                 };
                 push(i, to);

@@ -24,7 +24,7 @@ use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
 use super::scene_polygons::ScenePolygons;
-use super::shared_work::share_out;
+use crate::ranks::share_out;
 use crate::scene::Scene;
 
 /// Polygons between two progress calls. Plain choice.
@@ -128,9 +128,8 @@ fn in_batches<R: Send + Serialize + DeserializeOwned>(
 fn sums_by_group(exchanges: Vec<Exchange>) -> Vec<Exchange> {
     let groups = exchanges.chunk_by(|a, b| a.to == b.to);
     let sum = |of_group: &[Exchange]| {
-        let squares: f64 = of_group.iter().map(|e| f64::from(e.error).powi(2)).sum();
-        let value = of_group.iter().map(|e| e.value).sum();
-        Exchange::new(of_group[0].to, Estimate { value, error: squares.sqrt() })
+        let exchanges = of_group.iter().map(Exchange::estimate);
+        Exchange::new(of_group[0].to, Estimate::sum(exchanges))
     };
     groups.map(sum).collect()
 }

@@ -48,8 +48,8 @@ const COORDINATES: Names<Coordinates> =
 Writes STEM.exr, irradiance in W/m² and which texels gathered, and STEM.glb, the scene with its \
 coordinates in the map as TEXCOORD_1 and the map's radiosity as an image. Surfaces that reflect on \
 both sides have texels for each; --sides front makes them one-sided. Ctrl-C stops the command, \
-which then writes a map of fewer texels where one is done. STEM is the scene's path with .light-map \
-as its ending unless --out gives another.")]
+which then writes a map of fewer texels where one is done. STEM is the scene's path with \
+.light-map as its ending unless --out gives another.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]

@@ -12,7 +12,7 @@ use gltf_json::image::MimeType;
 use gltf_json::material::{PbrMetallicRoughness, StrengthFactor};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::scene::Node;
-use gltf_json::texture::{Sampler, Texture};
+use gltf_json::texture::{MagFilter, MinFilter, Sampler, Texture, WrappingMode};
 use gltf_json::validation::Checked::{self, Valid};
 use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
 
@@ -137,9 +137,21 @@ impl GlbFile {
         })
     }
 
-    /// Adds a texture that shows the image `source`.
-    pub fn add_texture(&mut self, source: Index<Image>, sampler: Sampler) -> Index<Texture> {
-        let sampler = Some(self.root.push(sampler));
+    /// Adds a texture that shows the image `source`, smoothly filtered; repeated unless `clamped`.
+    pub fn add_texture(
+        &mut self,
+        source: Index<Image>,
+        min_filter: MinFilter,
+        clamped: bool,
+    ) -> Index<Texture> {
+        let wrap = Valid(if clamped { WrappingMode::ClampToEdge } else { WrappingMode::Repeat });
+        let sampler = Some(self.root.push(Sampler {
+            mag_filter: Some(Valid(MagFilter::Linear)),
+            min_filter: Some(Valid(min_filter)),
+            wrap_s: wrap,
+            wrap_t: wrap,
+            ..Default::default()
+        }));
         self.root.push(Texture { sampler, source, name: None, extensions: None, extras: None })
     }
 

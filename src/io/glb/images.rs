@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec2;
-use image::ExtendedColorType::{Rgb8, Rgba8};
+use image::ExtendedColorType::{self, Rgb8, Rgba8};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageResult};
 use rayon::prelude::*;
@@ -102,10 +102,7 @@ impl Image {
                 (bytes.collect::<Vec<_>>().into_flattened(), Rgba8)
             }
         };
-        let mut png = vec![];
-        let [width, height] = texels.size;
-        PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
-            .write_image(&bytes, width, height, format)?;
+        let png = png(&bytes, texels.size, format)?;
         Ok(Image { png, peak, mean: tone.linear(mean_radiosity(material, irradiance)) })
     }
 
@@ -150,6 +147,18 @@ impl Texels<'_> {
     fn is_solid(&self, texel: DVec2) -> bool {
         self.shown.mask.is_none_or(|mask| mask.is_solid(texel))
     }
+}
+
+/// A PNG file of these pixels.
+pub(super) fn png(
+    bytes: &[u8],
+    [width, height]: [u32; 2],
+    format: ExtendedColorType,
+) -> ImageResult<Vec<u8>> {
+    let mut png = vec![];
+    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
+        .write_image(bytes, width, height, format)?;
+    Ok(png)
 }
 
 /// Irradiance of a vertex; 0 if unknown.

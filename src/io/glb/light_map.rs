@@ -7,14 +7,14 @@ use std::path::Path;
 use glam::{DVec2, Vec3};
 use gltf_json::material::PbrMetallicRoughness;
 use gltf_json::mesh::Semantic;
-use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, Texture, WrappingMode};
+use gltf_json::texture::{Info, MinFilter};
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Index, Value};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 use rustc_hash::FxHashMap;
 
 use super::file::{Attributes, GlbFile, unlit};
+use super::images::png;
 use super::origin;
 use super::primitives::Shown;
 use crate::error::Error;
@@ -44,7 +44,10 @@ pub fn write_light_map_glb(
     tone: &ToneCurve,
 ) -> Result<(), Error> {
     let path = path.as_ref();
-    let png = png(map, tone).map_err(|e| cannot_write(path, io::Error::other(e)))?;
+    let bytes: Vec<u8> = map.radiosity().into_iter().flat_map(|c| tone.display(c)).collect();
+    let size = [map.atlas.width(), map.atlas.height()];
+    let png = png(&bytes, size, ExtendedColorType::Rgb8);
+    let png = png.map_err(|e| cannot_write(path, io::Error::other(e)))?;
     let (scene, origin) = (map.atlas.scene(), origin(map.atlas.scene().bounds()));
     let mut file = GlbFile::new(&BTreeMap::from([
         ("axes", Value::from("those of the scene's file")),
@@ -53,7 +56,8 @@ pub fn write_light_map_glb(
         ("light map", Value::from("radiosity times exposure, highlights rolled off")),
         ("exposure", Value::from(tone.exposure())),
     ]));
-    let index = add_texture(&mut file);
+    // Without mipmaps, in which charts would run together.
+    let index = file.add_texture(Index::new(0), MinFilter::Linear, true);
     let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
     for of_group in primitives(map, origin).chunk_by(|a, b| a.group == b.group) {
         let mut parts = vec![];
@@ -74,15 +78,6 @@ pub fn write_light_map_glb(
     }
     file.add_image(png, Some("light map"));
     file.write(path, groups, origin)
-}
-
-/// The radiosity of a map through `tone`, as PNG.
-fn png(map: &LightMap, tone: &ToneCurve) -> image::ImageResult<Vec<u8>> {
-    let bytes: Vec<u8> = map.radiosity().into_iter().flat_map(|c| tone.display(c)).collect();
-    let (mut png, [width, height]) = (vec![], [map.atlas.width(), map.atlas.height()]);
-    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
-        .write_image(&bytes, width, height, ExtendedColorType::Rgb8)?;
-    Ok(png)
 }
 
 /// The triangles of one group and one material.
@@ -149,19 +144,6 @@ impl Primitive {
             (Valid(Semantic::TexCoords(1)), places),
         ])
     }
-}
-
-/// Adds the map, the only image, as a texture, smoothly filtered and not repeated.
-fn add_texture(file: &mut GlbFile) -> Index<Texture> {
-    let sampler = Sampler {
-        mag_filter: Some(Valid(MagFilter::Linear)),
-        // Without mipmaps, in which charts would run together.
-        min_filter: Some(Valid(MinFilter::Linear)),
-        wrap_s: Valid(WrappingMode::ClampToEdge),
-        wrap_t: Valid(WrappingMode::ClampToEdge),
-        ..Default::default()
-    };
-    file.add_texture(Index::new(0), sampler)
 }
 
 /// Unit normals at the corners of each triangle, as glTF requires.

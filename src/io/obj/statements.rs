@@ -232,8 +232,8 @@ impl Statements {
         Ok(())
     }
 
-    /// Reads the corners of a face, each once where it comes several times in a row; returns whether
-    /// one does.
+    /// Reads the corners of a face, each once where it comes several times in a row; returns
+    /// whether one does.
     fn read_corners(&mut self, line: &Line, rest: &str) -> Result<bool, Error> {
         self.corners.clear();
         for word in words(rest) {

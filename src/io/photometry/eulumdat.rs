@@ -30,30 +30,11 @@ const HEADER: usize = 26;
 pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     let mut warnings = vec![];
     let mut rest = physical_lines(file, text);
-    let header: Vec<Line> = rest.by_ref().take(HEADER).collect();
-    let field = |number: usize| Field { file, number, line: header.get(number - 1) };
-    let symmetry = match field(3).value() {
-        Some(code) if [0.0, 1.0, 2.0, 3.0, 4.0].contains(&code) => code as u8,
-        _ => {
-            let found = format!("{} for the symmetry", quoted(&[field(3).text()]));
-            let remedy = "give an IESNA LM-63 file, or a EULUMDAT file with 0 to 4 in line 3";
-            return Err(field(3).error(found, remedy));
-        }
-    };
-    let plane_count = field(4).count("the number of C-planes")?;
-    let polar_count = field(6).count("the number of angles in a plane")?;
-    let opening = opening([16, 17, 18, 19, 20, 21].map(|k| field(k).number_or_zero() / 1000.0));
-    let mut factor = field(24).number_or_zero();
-    if factor <= 0.0 {
-        warnings.push(format!("the factor {factor} for intensities is taken for 1"));
-        factor = 1.0;
-    }
-    let sets = field(26).number("the number of sets of lamps")?;
-    if !(0.0..=20.0).contains(&sets) || sets.fract() != 0.0 {
-        let found = format!("{sets} sets of lamps");
-        return Err(field(26).error(found, "give a whole number from 0 to 20"));
-    }
-    let lamps: Vec<Line> = rest.by_ref().take(6 * sets as usize).collect();
+    let lines: Vec<Line> = rest.by_ref().take(HEADER).collect();
+    let field = |number: usize| Field { file, number, line: lines.get(number - 1) };
+    let Header { symmetry, planes, angles, opening, mut factor, sets } =
+        Header::read(&field, &mut warnings)?;
+    let lamps: Vec<Line> = rest.by_ref().take(6 * sets).collect();
     let lamp = |k: usize| Field { file, number: HEADER + k, line: lamps.get(k - 1) };
     let is_absolute = lamp(1).number_or_zero() < 0.0;
     let flux = lamp(3).number_or_zero().abs();
@@ -64,30 +45,14 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
     }
     let mut numbers = Numbers::new(file, rest, Comma::IsDecimal);
     numbers.list(10, "a direct ratio")?;
-    let azimuths = numbers.list(plane_count, "a C-angle")?;
-    let angles = numbers.list(polar_count, "an angle γ")?;
-    let values = numbers.rest();
-    let mut measured = measured(symmetry, &azimuths);
-    let (wanted, all) = (measured.len() * polar_count, azimuths.len() * polar_count);
-    if values.len() < wanted || wanted == 0 {
-        let (found, planes) = (values.len(), measured.len());
-        let found = format!("{found} intensities for {planes} planes of symmetry {symmetry}");
-        return Err(numbers.error(found, "give a file that is whole, with counts that are right"));
-    }
-    let mut is_folded = true;
-    if values.len() >= all && all > wanted {
-        warnings.push(format!("all planes are there in spite of symmetry {symmetry}: they count"));
-        (measured, is_folded) = (azimuths, false);
-    } else if values.len() > wanted {
-        let left = values.len() - wanted;
-        warnings.push(format!("{left} numbers after the last intensity are left out"));
-    }
-    let rows = values.chunks_exact(polar_count).map(<[f64]>::to_vec);
-    let mut planes = Planes { angles, planes: measured.into_iter().zip(rows).collect() };
+    let azimuths = numbers.list(planes, "a C-angle")?;
+    let angles = numbers.list(angles, "an angle γ")?;
+    let (symmetry, mut planes) =
+        measured_planes(symmetry, azimuths, angles, &mut numbers, &mut warnings)?;
     planes.sort(&mut warnings);
     planes.scale(factor, &mut warnings);
     let wrong = |found: String| numbers.error(found, "give those that the symmetry needs");
-    unfold(if is_folded { symmetry } else { 0 }, &mut planes).map_err(wrong)?;
+    unfold(symmetry, &mut planes).map_err(wrong)?;
     let intensity = planes.distribution(Pole::Aim).map_err(|e| e.inside(file))?;
     Ok(Photometry {
         name: name_of(&format!("{} {}", field(1).text(), field(9).text())),
@@ -97,6 +62,80 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         power: lamp(6).number_or_zero().max(0.0),
         warnings,
     })
+}
+
+/// The numbers of the header.
+struct Header {
+    symmetry: u8,
+    /// C-planes, and angles γ in each.
+    planes: usize,
+    angles: usize,
+    opening: Opening,
+    /// Factor of the intensities.
+    factor: f64,
+    /// Sets of lamps.
+    sets: usize,
+}
+
+impl Header {
+    fn read<'a>(
+        field: &impl Fn(usize) -> Field<'a>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Header, Error> {
+        let symmetry = match field(3).value() {
+            Some(code) if [0.0, 1.0, 2.0, 3.0, 4.0].contains(&code) => code as u8,
+            _ => {
+                let found = format!("{} for the symmetry", quoted(&[field(3).text()]));
+                let remedy = "give an IESNA LM-63 file, or a EULUMDAT file with 0 to 4 in line 3";
+                return Err(field(3).error(found, remedy));
+            }
+        };
+        let planes = field(4).count("the number of C-planes")?;
+        let angles = field(6).count("the number of angles in a plane")?;
+        let size = [16, 17, 18, 19, 20, 21].map(|k| field(k).number_or_zero() / 1000.0);
+        let mut factor = field(24).number_or_zero();
+        if factor <= 0.0 {
+            warnings.push(format!("the factor {factor} for intensities is taken for 1"));
+            factor = 1.0;
+        }
+        let sets = field(26).number("the number of sets of lamps")?;
+        if !(0.0..=20.0).contains(&sets) || sets.fract() != 0.0 {
+            let found = format!("{sets} sets of lamps");
+            return Err(field(26).error(found, "give a whole number from 0 to 20"));
+        }
+        let (opening, sets) = (opening(size), sets as usize);
+        Ok(Header { symmetry, planes, angles, opening, factor, sets })
+    }
+}
+
+/// The planes whose intensities come next in `numbers`, and their symmetry: none where all of
+/// `azimuths` are there.
+fn measured_planes(
+    symmetry: u8,
+    azimuths: Vec<f64>,
+    angles: Vec<f64>,
+    numbers: &mut Numbers,
+    warnings: &mut Vec<String>,
+) -> Result<(u8, Planes), Error> {
+    let values = numbers.rest();
+    let measured = measured(symmetry, &azimuths);
+    let (wanted, all) = (measured.len() * angles.len(), azimuths.len() * angles.len());
+    if values.len() < wanted || wanted == 0 {
+        let (found, planes) = (values.len(), measured.len());
+        let found = format!("{found} intensities for {planes} planes of symmetry {symmetry}");
+        return Err(numbers.error(found, "give a file that is whole, with counts that are right"));
+    }
+    let has_all = values.len() >= all && all > wanted;
+    if has_all {
+        warnings.push(format!("all planes are there in spite of symmetry {symmetry}: they count"));
+    } else if values.len() > wanted {
+        let left = values.len() - wanted;
+        warnings.push(format!("{left} numbers after the last intensity are left out"));
+    }
+    let (symmetry, measured) = if has_all { (0, azimuths) } else { (symmetry, measured) };
+    let rows = values.chunks_exact(angles.len()).map(<[f64]>::to_vec);
+    let planes = measured.into_iter().zip(rows).collect();
+    Ok((symmetry, Planes { angles, planes }))
 }
 
 /// The C-angles, out of `azimuths`, of the planes that a file of this `symmetry` stores, in order.

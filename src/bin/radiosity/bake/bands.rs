@@ -134,7 +134,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Bands, Error> {
         let place = || format!("{file}: {what}");
         spectrum.values(&bands).map_err(|(found, remedy)| wrong(place(), found, remedy))
     };
-    let of_bands = of_materials(&materials, scene, &file, &values)?;
+    let of_bands = of_materials(&materials, scene, &file, values)?;
     let (sky, sun) = (values(&sky, "sky")?, values(&sun, "sun")?);
     let luminaires = match luminaires {
         Some(spectrum) => values(&spectrum, "luminaires")?,
@@ -164,7 +164,7 @@ fn of_materials(
     materials: &BTreeMap<String, MaterialEntry>,
     scene: &Scene,
     file: &str,
-    values: &dyn Fn(&Spectrum, &str) -> Result<Vec<f64>, Error>,
+    values: impl Fn(&Spectrum, &str) -> Result<Vec<f64>, Error>,
 ) -> Result<Vec<BandMaterial>, Error> {
     let known = |name: &String| scene.materials().iter().any(|material| material.name == *name);
     if let Some(name) = materials.keys().find(|name| *name != "*" && !known(name)) {
