@@ -62,7 +62,7 @@
 //! | [`bands`] | light in any number of bands on the mesh of a bake; spectra to colours |
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
-//! | [`ranks`] | processes that share out rows and view factors, as those of MPI |
+//! | [`ranks`] | processes that share out view factors, as those of MPI |
 //! | [`light_map`] | irradiance at the texels of a texture |
 //! | [`accuracy`] | the measure of error |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |

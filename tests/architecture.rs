@@ -18,17 +18,17 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("light", "error geometry progress sampling scene visibility"),
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
-    ("form_factor", "error geometry mesh ranks scene"),
+    ("form_factor", "error geometry mesh scene"),
     ("solver", "error form_factor geometry linear mesh progress scene visibility"),
     ("vertex", "error form_factor geometry mesh scene"),
     (
         "gather",
-        "accuracy error form_factor geometry linear mesh progress ranks sampling scene vertex \
+        "accuracy error form_factor geometry linear mesh progress sampling scene vertex \
          visibility",
     ),
     ("grid", "error gather geometry scene visibility"),
     ("probe", "error gather progress scene visibility"),
-    ("view_factor", "error form_factor geometry mesh progress ranks sampling scene visibility"),
+    ("view_factor", "error form_factor geometry ranks sampling scene visibility"),
     ("heat", "error geometry linear view_factor"),
     (
         "backend",
@@ -42,10 +42,10 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy backend error form_factor gather geometry light mesh progress sampling scene \
          solver verify vertex visibility",
     ),
-    ("bands", "accuracy backend bake error gather linear mesh scene vertex visibility"),
+    ("bands", "accuracy backend bake error gather linear mesh scene vertex"),
     (
         "light_map",
-        "accuracy backend bake error gather geometry mesh progress sampling scene verify vertex \
+        "accuracy backend bake error gather geometry mesh progress sampling scene vertex \
          visibility",
     ),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),

@@ -57,8 +57,9 @@ impl Photometry {
 /// in lumens and lux: then all numbers of the scene should be photometric, `Ke` in cd/m².
 ///
 /// # Errors
-/// [`ErrorKind::File`] when the file cannot be read or has more than 4 MiB; [`ErrorKind::Scene`]
-/// with its line if it is of neither format, ends early, or has invalid numbers.
+/// [`crate::ErrorKind::File`] when the file cannot be read or has more than 4 MiB;
+/// [`crate::ErrorKind::Scene`] with its line if it is of neither format, ends early, or has invalid
+/// numbers.
 pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
     let path = path.as_ref();
     // Five times the bytes of a file with 361 × 181 values.
