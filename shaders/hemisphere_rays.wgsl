@@ -1,5 +1,5 @@
-// Cosine-distributed rays from the points of a list, and the sums of their results: a workgroup per point, a
-// lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl,
+// Cosine-distributed rays from the points of a list, and the sums of their results: a workgroup per
+// point, a lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl,
 // shared/gather_state.wgsl, shared/hemisphere.wgsl, shared/near_field.wgsl, shared/lattice.wgsl and
 // shared/field.wgsl before it.
 

@@ -1,5 +1,6 @@
-// Rays from the points of a list to points on their lights and on the sun: a workgroup per point. Needs
-// shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl and shared/gather_state.wgsl before it.
+// Rays from the points of a list to points on their lights and on the sun: a workgroup per point.
+// Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl and shared/gather_state.wgsl before
+// it.
 
 @compute @workgroup_size(64)
 fn light_rays(

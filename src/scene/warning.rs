@@ -22,8 +22,8 @@ pub struct Warning {
     pub names: Vec<String>,
 }
 
-/// The kinds: documentation, name, noun in singular and plural, and the remedy where a strict reader
-/// refuses the file.
+/// The kinds: documentation, name, noun in singular and plural, and the remedy where a strict
+/// reader refuses the file.
 macro_rules! warning_kinds {
     ($($(#[$doc:meta])* $kind:ident: $one:literal, $many:literal $(=> $remedy:literal)?;)*) => {
         /// Kind of a [`Warning`].

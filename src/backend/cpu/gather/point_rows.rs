@@ -77,8 +77,7 @@ impl RayGather {
             PointRow { share, hits: Vec::with_capacity(range.len()), ..Default::default() };
         // Emission on the way is in no row: rows with lights leave near surfaces as they are.
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
-        let mut near = vec![];
-        let wide = direct.map_or(&[][..], DirectLight::wide);
+        let (mut near, wide) = (vec![], direct.map_or(&[][..], DirectLight::wide));
         let has_entry = |light: u32| direct.is_some_and(|direct| direct.samples(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
         self.cast(point, rotation, range.clone(), |ray, direction, hit| {
