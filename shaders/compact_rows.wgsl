@@ -3,15 +3,6 @@
 
 const COMPACT_LANES: u32 = 256u;
 
-struct RowEntry {
-    patch_: u32,          // in its batch
-    slot: u32,
-    count: u32,           // rays
-    padding: u32,
-    passed: vec3u,        // sum of transmittances, in units of 1/RowSettings::unit; 0 without panes
-    padding_2: u32,
-}
-
 struct RowEntries {
     count: atomic<u32>,   // of entries; those beyond the capacity are counted, not written
     padding: array<u32, 3>,
@@ -19,6 +10,7 @@ struct RowEntries {
 }
 
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
+@group(1) @binding(3) var<uniform> settings: RowSettings;
 @group(1) @binding(4) var<storage, read_write> list: RowEntries;
 
 var<workgroup> ends: array<u32, COMPACT_LANES>;   // cumulative counts of lanes

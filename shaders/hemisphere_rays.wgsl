@@ -1,29 +1,16 @@
-// Cosine-distributed rays from each point, and the sums of their results: a workgroup per point, a
-// lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl,
+// Cosine-distributed rays from the points of a list, and the sums of their results: a workgroup per
+// point, a lane per ray. Needs shared/trace.wgsl, shared/lights.wgsl, shared/sky.wgsl,
 // shared/gather_state.wgsl, shared/hemisphere.wgsl, shared/near_field.wgsl, shared/lattice.wgsl and
 // shared/field.wgsl before it.
 
 var<private> light_sums: array<Visible, 16>;
 
-// All points.
 @compute @workgroup_size(64)
 fn hemisphere_rays(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    cast_rays(group.x, lane);
-}
-
-// Points whose rays are doubled.
-@compute @workgroup_size(64)
-fn more_hemisphere_rays(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    cast_rays(work.points[group.x], lane);
-}
-
-fn cast_rays(p: u32, lane: u32) {
+    let p = work.points[group.x];
     let point = points[p];
     let light_count = states[p].light_count;
     let rays = rays_of_pass(states[p].ray_count, states[p].pending);
@@ -61,8 +48,8 @@ fn cast_rays(p: u32, lane: u32) {
             let sum = light_sums[half * light_count + k];
             let of_light = added_up(lane, vec4f(sum.seen, sum.all));
             if lane == 0u && states[p].lights[k].is_wide != 0u {
-                states[p].visible[9u * half + k].seen += of_light.xyz;
-                states[p].visible[9u * half + k].all += of_light.w;
+                states[p].visible[half][k].seen += of_light.xyz;
+                states[p].visible[half][k].all += of_light.w;
             }
         }
     }

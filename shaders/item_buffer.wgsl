@@ -2,24 +2,6 @@
 // (the clear value) for nothing, BACK, or a cell of the triangle's lattice, computed from the
 // barycentric position. Needs shared/corner.wgsl and shared/lattice.wgsl before it.
 
-struct FaceView {
-    eye: vec3f,           // patch centre, relative to the middle of the scene, in units of its size
-    near: f32,            // near plane, same unit
-    right: vec3f,         // unit vectors of the view, right x up = -forward
-    bottom: f32,          // tangent of the lowest line's elevation: -1 or 0
-    up: vec3f,
-    own_triangle: u32,    // position of the patch's own triangle in the drawing order: never drawn
-    forward: vec3f,
-    padding: u32,
-    eye_low: vec3f,       // rounding remainder of `eye`
-    padding_2: u32,
-}
-
-struct TriangleCells {
-    first: u32,           // item of its first cell
-    side: u32,            // cells along an edge, a power of two
-}
-
 @group(0) @binding(0) var<storage, read> corners: array<Corner>;
 @group(0) @binding(1) var<storage, read> triangles: array<TriangleCells>;
 @group(0) @binding(2) var<storage, read> views: array<FaceView>;

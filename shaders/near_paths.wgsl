@@ -28,25 +28,12 @@ fn seed_of(point: TracedPoint, k: u32) -> u32 {
     return scrambled(scrambled(scrambled(scrambled(bits.x) ^ bits.y) ^ bits.z) ^ k);
 }
 
-// All points.
 @compute @workgroup_size(64)
 fn near_paths(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    follow_paths(group.x, lane);
-}
-
-// Points whose rays are doubled.
-@compute @workgroup_size(64)
-fn more_near_paths(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    follow_paths(work.points[group.x], lane);
-}
-
-fn follow_paths(p: u32, lane: u32) {
+    let p = work.points[group.x];
     let point = points[p];
     let rays = rays_of_pass(states[p].ray_count, states[p].pending);
     var covered = array<bool, 2>(

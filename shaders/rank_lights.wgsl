@@ -150,12 +150,8 @@ fn write(p: u32, kept: u32) {
         }
     }
     states[p].light_count = left;
-    for (var k = 0u; k < 2u; k++) {
-        states[p].rays[k] = RaySums();
-    }
-    for (var k = 0u; k < 18u; k++) {
-        states[p].visible[k] = Visible();
-    }
+    states[p].rays = array<RaySums, 2>();
+    states[p].visible = array<array<Visible, 9>, 2>();
     states[p].ray_count = settings.min_rays;
     states[p].shadow_count = max(settings.min_rays / RAYS_PER_SHADOW_RAY, 2u);
     states[p].pending = 3u;

@@ -4,12 +4,6 @@
 // A thread processes one pixel column of a strip, and looks the element up and adds to memory only
 // where the item changes.
 
-struct Reduction {
-    resolution: u32,      // N: an item buffer is N wide and 3N high
-    slots: u32,           // words of a row: open, back, then one per element
-    stride: u32,          // words per line of an item buffer, at least N
-}
-
 @group(0) @binding(0) var<storage, read> items: array<u32>;
 @group(0) @binding(1) var<storage, read> weights: array<u32>;
 @group(0) @binding(2) var<storage, read_write> rows: array<atomic<u32>>;

@@ -5,18 +5,10 @@
 // Slots of a row: open, back, then the elements. With panes three more rows of a patch add up their
 // transmittances, per channel in units of 1/RowSettings::unit.
 
-struct TracedPatch {
-    position: vec3f,
-    near: f32,
-    position_low: vec3f,
-    own_triangle: u32,    // rays do not hit it
-    normal: vec3f,
-    rotation: f32,        // of the directions about the normal, in turns
-}
-
 @group(1) @binding(0) var<storage, read> patches: array<TracedPatch>;
 @group(1) @binding(1) var<storage, read_write> counts: array<atomic<u32>>;
 @group(1) @binding(2) var directions: texture_2d<f32>;
+@group(1) @binding(3) var<uniform> settings: RowSettings;
 
 @compute @workgroup_size(64)
 fn row_rays(@builtin(global_invocation_id) id: vec3u) {

@@ -5,23 +5,11 @@
 // error = max(|E of the first half − E of the second|, largest ray / rays) / 2, for rays over the
 // hemisphere and for rays to lights; those with the larger error are doubled.
 
-struct Sample {
-    irradiance: vec3f,
-    noise: f32,
-    direct: vec3f,
-    escaped: f32,
-    back: f32,
-    inverse_distance: f32,
-    rays: u32,            // over the hemisphere
-    shadow_rays: u32,     // to each light
-    covered: u32,         // whether paths found the light of near surfaces
-    padding: array<u32, 3>,
-}
-
 @group(1) @binding(2) var<storage, read_write> samples: array<Sample>;
 @group(1) @binding(4) var<storage, read_write> work: Work;
 
-const SINE_OF_SUN: f32 = 0.0046524;
+// By light and sun.
+alias Visibilities = array<Visible, 9>;
 
 // The irradiance of the lights of one kind, by the visible part of each.
 fn of_lights(p: u32, first: Visibilities, is_wide: bool, points: f32) -> vec3f {
@@ -33,33 +21,20 @@ fn of_lights(p: u32, first: Visibilities, is_wide: bool, points: f32) -> vec3f {
             let light = lights[ranked.light];
             var share = 1.0 / max(points, 1.0);
             if light.is_convex != 0u {
-                share = ranked.factor / max(seen.lights[k].all, 1e-37);
+                share = ranked.factor / max(seen[k].all, 1e-37);
             }
-            irradiance += light.exitance * seen.lights[k].seen * share;
+            irradiance += light.exitance * seen[k].seen * share;
         }
     }
     return irradiance;
-}
-
-// Visibilities by light and sun.
-struct Visibilities {
-    lights: array<Visible, 9>,
-}
-
-fn half_of(p: u32, half: u32) -> Visibilities {
-    var out: Visibilities;
-    for (var k = 0u; k < 9u; k++) {
-        out.lights[k] = states[p].visible[9u * half + k];
-    }
-    return out;
 }
 
 fn together(a: Visibilities, b: Visibilities) -> Visibilities {
     var out = a;
     var other = b;
     for (var k = 0u; k < 9u; k++) {
-        out.lights[k].seen += other.lights[k].seen;
-        out.lights[k].all += other.lights[k].all;
+        out[k].seen += other[k].seen;
+        out[k].all += other[k].all;
     }
     return out;
 }
@@ -92,8 +67,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     if pending == 2u {
         shadow_count *= 2u;
     }
-    var halves = array<RaySums, 2>(states[p].rays[0], states[p].rays[1]);
-    var seen = array<Visibilities, 2>(half_of(p, 0u), half_of(p, 1u));
+    var halves = states[p].rays;
+    var seen = states[p].visible;
     var all_seen = together(seen[0], seen[1]);
     let rays = f32(ray_count);
     // Of near surfaces the light by the field, unless paths have found it.
@@ -113,14 +88,14 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
         ray_means[h] = (halves[h].light + halves[h].lamps) / (0.5 * rays)
             + of_lights(p, seen[h], true, 0.0);
         shadow_means[h] = of_lights(p, seen[h], false, 0.5 * shadow_rays)
-            + of_sun(normal, seen[h].lights[SUN], 0.5 * shadow_rays);
+            + of_sun(normal, seen[h][SUN], 0.5 * shadow_rays);
     }
     let light = halves[0].light + halves[1].light;
     let emitted = halves[0].lamps + halves[1].lamps;
     let largest = max(halves[0].largest, halves[1].largest);
     let of_wide = of_lights(p, all_seen, true, 0.0);
     let of_shadows = of_lights(p, all_seen, false, shadow_rays)
-        + of_sun(normal, all_seen.lights[SUN], shadow_rays);
+        + of_sun(normal, all_seen[SUN], shadow_rays);
     var ray_error = states[p].ray_error;
     if (pending & 1u) != 0u {
         ray_error = max(distance(ray_means[0], ray_means[1]), largest / rays) / 2.0;
@@ -171,10 +146,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
         0.0, 0.0, vec3f(0.0), 0.0,
     );
     states[p].rays[1] = RaySums();
-    for (var k = 0u; k < 9u; k++) {
-        states[p].visible[k] = all_seen.lights[k];
-        states[p].visible[9u + k] = Visible();
-    }
+    states[p].visible[0] = all_seen;
+    states[p].visible[1] = Visibilities();
     if next == 1u {
         let at = atomicAdd(&work.ray_groups[0], 1u);
         work.points[at] = p;

@@ -20,6 +20,7 @@ mod box_overlap;
 mod clusters;
 mod contact_cuts;
 mod contacts;
+mod fingerprint;
 mod large_triangles;
 mod quadtree;
 pub(crate) mod sizing;
@@ -33,7 +34,6 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::Xxh3;
 
 use crate::error::{Error, ErrorKind};
 use crate::scene::{Material, Rgb, Scene, longest_edge};
@@ -149,19 +149,29 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
+    /// The roots alone, without elements, normals and areas.
+    fn of_roots(scene: Arc<Scene>) -> Mesh {
+        let count = scene.triangles().len();
+        Mesh {
+            scene,
+            nodes: (0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)).collect(),
+            elements: vec![],
+            depths: vec![0; count],
+            normals: Arc::default(),
+            areas: Arc::default(),
+            clusters: Arc::default(),
+            textured_reflectances: Arc::default(),
+            solid_shares: Arc::default(),
+        }
+    }
+
     /// Splits every triangle as long as `is_inner` returns true for the triangle and a cell of it.
     fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
         let mut mesh = Mesh {
-            nodes: (0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)).collect(),
-            elements: vec![],
-            depths: vec![0; count],
             normals: (0..count).map(|t| scene.normal(t)).collect(),
             areas: (0..count).map(|t| scene.area(t)).collect(),
-            clusters: Arc::default(),
-            textured_reflectances: Arc::default(),
-            solid_shares: Arc::default(),
-            scene,
+            ..Mesh::of_roots(scene)
         };
         for root in 0..count {
             mesh.build_subtree(root, (), &|node, ()| {
@@ -188,21 +198,15 @@ impl Mesh {
         }
         let mut is_split = vec![false; self.element_count()];
         elements.iter().for_each(|&e| is_split[e] = true);
-        let count = self.depths.len();
-        let mut nodes = Vec::with_capacity(self.nodes.len() + 4 * elements.len());
-        nodes.extend((0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)));
         let mut split = Mesh {
-            scene: self.scene.clone(),
-            nodes,
-            elements: Vec::with_capacity(wanted),
-            depths: vec![0; count],
             normals: self.normals.clone(),
             areas: self.areas.clone(),
             clusters: self.clusters.clone(),
-            textured_reflectances: Arc::default(),
-            solid_shares: Arc::default(),
+            ..Mesh::of_roots(self.scene.clone())
         };
-        for root in 0..count {
+        split.nodes.reserve(4 * elements.len() + self.nodes.len());
+        split.elements.reserve(wanted);
+        for root in 0..self.depths.len() {
             // A cell of the old mesh is split as it was, or if requested; a new one is not.
             split.build_subtree(root, Some(root), &|_, old: Option<usize>| {
                 let Node { children, first_element, .. } = self.nodes[old?];
@@ -264,54 +268,6 @@ impl Mesh {
     /// Clusters of triangles.
     pub(crate) fn clusters(&self) -> &Clusters {
         self.clusters.get_or_init(|| Clusters::new(&self.scene))
-    }
-
-    /// A hash of all that the light on this mesh depends on: positions, materials, elements,
-    /// clusters. Names do not matter, nor does the order of vertices.
-    pub(crate) fn fingerprint(&self) -> u64 {
-        let mut all = Xxh3::new();
-        for t in 0..self.scene.triangles().len() {
-            let ([a, b, c], material) = (self.scene.corners(t), self.scene.material(t));
-            let triples = [a, b, c, material.reflectance, material.exitance];
-            all.update(bytemuck::bytes_of(&triples.map(|v| v.to_array())));
-            if material.is_translucent() {
-                all.update(bytemuck::bytes_of(&material.transmittance.to_array()));
-            }
-        }
-        for &element in &self.elements {
-            let Node { triangle, cell: Cell { level, i, j, flipped }, .. } = *self.node(element);
-            all.update(bytemuck::bytes_of(&[triangle, level, i, j, flipped.into()]));
-        }
-        all.update(bytemuck::cast_slice(&self.scene.sky().key()));
-        for luminaire in self.scene.luminaires() {
-            all.update(bytemuck::cast_slice(&luminaire.key().collect::<Vec<_>>()));
-        }
-        if self.scene.has_textures() {
-            for e in 0..self.element_count() {
-                let pair = [self.reflectance(e), self.exitance(e)];
-                all.update(bytemuck::bytes_of(&pair.map(|v| v.to_array())));
-            }
-        }
-        if let Some(panes) = self.scene.clear_panes() {
-            for t in 0..self.scene.triangles().len() {
-                let share = panes.transmittance(t).unwrap_or(-Rgb::ONE);
-                all.update(bytemuck::bytes_of(&share.to_array()));
-            }
-        }
-        for (m, mask) in self.scene.masks() {
-            let [scale, offset] = [mask.scale, mask.offset].map(|v| v.to_array());
-            all.update(bytemuck::bytes_of(&[m, mask.clamped.into(), mask.texture.size()[0]]));
-            all.update(bytemuck::bytes_of(&[scale, offset]));
-            all.update(mask.texture.bytes());
-        }
-        if self.scene.has_cut_outs() {
-            for t in 0..self.scene.triangles().len() {
-                let places = self.scene.texture_coordinates(t).unwrap_or_default();
-                all.update(bytemuck::bytes_of(&places.map(|place| place.to_array())));
-            }
-        }
-        self.clusters().tree().for_each(|parts| all.update(bytemuck::bytes_of(&parts)));
-        all.digest()
     }
 
     /// Whether elements of `other` have the same positions in the same triangles.

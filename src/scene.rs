@@ -14,6 +14,7 @@ mod cut;
 mod cut_outs;
 mod derived;
 pub(crate) mod glass_bodies;
+mod half_edge;
 mod intensity;
 mod luminaire;
 mod material;
@@ -42,6 +43,7 @@ use clear_panes::ClearPanes;
 use covers::Covers;
 pub(crate) use cut::Piece;
 use derived::Derived;
+pub(crate) use half_edge::HalfEdge;
 pub use intensity::{IntensityDistribution, Pole};
 pub use luminaire::{Luminaire, Opening};
 pub use material::Material;
@@ -149,71 +151,27 @@ impl Scene {
         mut texture_coordinates: Vec<[DVec2; 3]>,
         textures: BTreeMap<u32, MaterialTextures>,
     ) -> Result<Scene, Error> {
-        for (i, p) in positions.iter().enumerate() {
-            if !p.is_finite() {
-                let place = format!("vertex {}", i + 1);
-                return Err(bad(place, format!("coordinates {p}"), "all three must be finite"));
-            }
-        }
-        materials.iter().try_for_each(Material::check)?;
-        for (i, t) in triangles.iter().enumerate() {
-            let tables = [
-                ("group", t.group, groups.len()),
-                ("material", t.material, materials.len()),
-                ("vertex", t.corners[0], positions.len()),
-                ("vertex", t.corners[1], positions.len()),
-                ("vertex", t.corners[2], positions.len()),
-            ];
-            for (what, index, count) in tables {
-                if index as usize >= count {
-                    return Err(bad(
-                        format!("triangle {}", i + 1),
-                        format!("{what} index {index}"),
-                        format!("must be below {count}"),
-                    ));
-                }
-            }
-            let (longest, cross) = longest_edge_and_cross(&positions, t);
-            if !(cross * cross).is_finite() || !(longest * longest).is_finite() {
-                return Err(bad(
-                    format!("triangle {} of group {}", i + 1, quoted(&[&groups[t.group as usize]])),
-                    format!("an extent of {longest:e}"),
-                    "scale the scene down: areas must stay finite in 64-bit floats",
-                ));
-            }
-        }
+        check(&positions, &triangles, &groups, &materials)?;
         let given = triangles.len();
-        let has_area = |t: &Triangle| {
-            let (longest, cross) = longest_edge_and_cross(&positions, t);
-            let corners = t.corners.map(|k| positions[k as usize].abs().max_element());
-            let reach = corners.into_iter().fold(longest, f64::max);
-            cross > 4.0 * f64::EPSILON * longest * reach && cross * cross >= f64::MIN_POSITIVE
-        };
+        let has_area = |t: &Triangle| has_area(&positions, t);
         let mut kept = triangles.iter().map(has_area);
         texture_coordinates.retain(|_| kept.next().unwrap_or(false));
         triangles.retain(has_area);
-        let degenerate = given - triangles.len();
         if triangles.is_empty() {
-            let found = match given {
-                0 => "no triangle".to_string(),
-                n => format!("{n} triangles, none with area"),
-            };
-            return Err(bad("scene", found, "give at least one triangle with area"));
+            return Err(none_with_area(given));
         }
+        let degenerate = given - triangles.len();
         let corners = triangles.iter().flat_map(|t| t.corners).map(|k| positions[k as usize]);
         let largest = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let coordinate_ulp = f64::EPSILON * largest;
-        let warnings = vec![];
-        let sky = Sky::default();
         let mut scene = Scene {
             positions,
             triangles,
             groups,
             materials,
             degenerate,
-            coordinate_ulp,
-            warnings,
-            sky,
+            coordinate_ulp: f64::EPSILON * largest,
+            warnings: vec![],
+            sky: Sky::default(),
             luminaires: Arc::default(),
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
             cut_sides: vec![],
@@ -448,10 +406,65 @@ impl Scene {
     }
 }
 
+/// Checks what a scene is made of: numbers are finite and indices in range.
+fn check(
+    positions: &[DVec3],
+    triangles: &[Triangle],
+    groups: &[String],
+    materials: &[Material],
+) -> Result<(), Error> {
+    for (i, p) in positions.iter().enumerate() {
+        if !p.is_finite() {
+            let place = format!("vertex {}", i + 1);
+            return Err(bad(place, format!("coordinates {p}"), "all three must be finite"));
+        }
+    }
+    materials.iter().try_for_each(Material::check)?;
+    for (i, t) in triangles.iter().enumerate() {
+        let [a, b, c] = t.corners.map(|corner| ("vertex", corner, positions.len()));
+        let indices =
+            [("group", t.group, groups.len()), ("material", t.material, materials.len()), a, b, c];
+        for (what, index, count) in indices {
+            if index as usize >= count {
+                return Err(bad(
+                    format!("triangle {}", i + 1),
+                    format!("{what} index {index}"),
+                    format!("must be below {count}"),
+                ));
+            }
+        }
+        let (longest, cross) = longest_edge_and_cross(positions, t);
+        if !(cross * cross).is_finite() || !(longest * longest).is_finite() {
+            return Err(bad(
+                format!("triangle {} of group {}", i + 1, quoted(&[&groups[t.group as usize]])),
+                format!("an extent of {longest:e}"),
+                "scale the scene down: areas must stay finite in 64-bit floats",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a triangle has an area: see [`Scene::new`].
+fn has_area(positions: &[DVec3], t: &Triangle) -> bool {
+    let (longest, cross) = longest_edge_and_cross(positions, t);
+    let corners = t.corners.map(|k| positions[k as usize].abs().max_element());
+    let reach = corners.into_iter().fold(longest, f64::max);
+    cross > 4.0 * f64::EPSILON * longest * reach && cross * cross >= f64::MIN_POSITIVE
+}
+
 /// Length of the longest edge of `t`, and of the cross product of two edges: twice its area.
 fn longest_edge_and_cross(positions: &[DVec3], t: &Triangle) -> (f64, f64) {
     let [a, b, c] = t.corners.map(|k| positions[k as usize]);
     (longest_edge([a, b, c]), (b - a).cross(c - a).length())
+}
+
+fn none_with_area(given: usize) -> Error {
+    let found = match given {
+        0 => "no triangle".to_string(),
+        n => format!("{n} triangles, none with area"),
+    };
+    bad("scene", found, "give at least one triangle with area")
 }
 
 fn bad(place: impl Into<String>, found: impl Into<String>, remedy: impl Into<String>) -> Error {

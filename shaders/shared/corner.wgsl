@@ -1,13 +1,5 @@
 // A corner of a triangle, and its view coordinates. Put before the draw shader.
 
-// A corner in two parts that add up to it.
-struct Corner {
-    high: vec3f,          // relative to the middle of the scene, in units of its size
-    back_is_covered: u32, // 1: coinciding fronts cover its triangle's back
-    low: vec3f,           // rounding remainder of `high`
-    padding: u32,
-}
-
 // Vector from the eye, itself in two parts, to a corner. For corners near the eye the first
 // difference is exact: small objects keep their shape.
 fn from_eye(corner: Corner, eye: vec3f, eye_low: vec3f) -> vec3f {

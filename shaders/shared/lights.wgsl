@@ -1,24 +1,6 @@
 // Lights, and the transmittance of clear panes. Needs shared/trace.wgsl before it.
 
-const MAX_EXPLICIT_LIGHTS: u32 = 8u;
-const NO_LIGHT: u32 = 0xffffffffu;
 const PI: f32 = 3.14159265;
-
-struct TracedLight {
-    // Per channel, in units of about the brightest. Rows after the lights: a pane's transmittance;
-    // of a translucent material that, and in the next row its reflectance.
-    exitance: vec3f,
-    is_convex: u32,       // no part of it hides another
-    first: u32,           // its first triangle in `lamps`
-    count: u32,
-    area: f32,
-    power_end: f32,       // cumulative share of the power of all lights up to its end
-}
-
-struct Lamp {
-    triangle: u32,        // its index in `triangles`
-    end: f32,             // cumulative share of the light's area up to its end
-}
 
 @group(0) @binding(5) var<storage, read> lights: array<TracedLight>;
 @group(0) @binding(6) var<storage, read> lamps: array<Lamp>;
@@ -57,18 +39,6 @@ fn passed(ray: Ray, end: f32) -> vec3f {
         node = NOTHING;
     }
     return share;
-}
-
-// A gather point.
-struct TracedPoint {
-    position: vec3f,
-    near: f32,
-    position_low: vec3f,
-    rotation: f32,        // of the directions about the normal, in turns
-    normal: vec3f,
-    second_rotation: f32, // of the other coordinate
-    luminaires: vec3f,    // irradiance from luminaires
-    padding: u32,
 }
 
 // Point k of Sobol's (0,2)-sequence, in (0, 1)².

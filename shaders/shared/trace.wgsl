@@ -4,52 +4,6 @@
 // rounding.
 
 const TURN: f32 = 6.2831853;
-const STACK: u32 = 33u;               // levels of the hierarchy, plus two
-
-struct TraceNode {
-    low_a: vec3f,         // the first child's box
-    child_a: u32,         // a node, or a leaf
-    high_a: vec3f,
-    child_b: u32,
-    low_b: vec3f,         // the second child's
-    padding: u32,
-    high_b: vec3f,
-    padding_2: u32,
-}
-
-struct TracedTriangle {
-    corner: vec3f,        // the first corner
-    index: u32,           // its index in the scene
-    corner_low: vec3f,    // rounding remainder of `corner`
-    flags: u32,
-    edge_u: vec3f,        // from there to the second corner
-    light: u32,           // the light that it belongs to, or the row of a pane's transmittance
-    edge_v: vec3f,        // to the third
-    extent: f32,          // maximum edge length
-}
-
-struct TracedSceneInfo {
-    panes: u32,           // root of the hierarchy of clear panes, or NOTHING
-    lights: u32,          // number of lights
-    sky_side: u32,        // pieces of the sky along the edge of a square; 0 if it is uniform
-    has_sun: u32,
-    sky: vec3f,           // radiosity of a surface as bright as a uniform sky
-    padding: u32,
-    sky_x: vec3f,         // the axes of the sky's pieces
-    padding_2: u32,
-    sky_y: vec3f,
-    padding_3: u32,
-    sky_z: vec3f,
-    padding_4: u32,
-    sun: vec3f,           // irradiance of a surface that faces it
-    padding_5: u32,
-    sun_middle: vec3f,    // towards it, unit length
-    padding_6: u32,
-    sun_right: vec3f,     // across, with the tangent of its radius as length
-    padding_7: u32,
-    sun_up: vec3f,
-    padding_8: u32,
-}
 
 @group(0) @binding(0) var<storage, read> nodes: array<TraceNode>;
 @group(0) @binding(1) var<storage, read> triangles: array<TracedTriangle>;

@@ -13,7 +13,6 @@
 //! With the balance heuristic a light adds at most E times the path's throughput at a vertex: as
 //! good for a lamp of a millimetre as for a sky all around.
 
-use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 use std::ops::{ControlFlow, Deref};
@@ -428,16 +427,15 @@ pub(crate) fn nearest_surfaces(
     diagonal: f64,
 ) -> Vec<Hit> {
     let reach = 1e-4 * diagonal;
-    let found = RefCell::new(vec![]);
+    let mut found = vec![];
     // From before it: what lies in one place with another, back to back, is met on its front only.
     rays.occluded(position + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
         if normals[hit.triangle].dot(normal) > 0.8 {
-            found.borrow_mut().push(*hit);
+            found.push(*hit);
         }
         false
     });
     let off = |hit: &Hit| (hit.distance - reach).abs();
-    let mut found = found.into_inner();
     let nearest = found.iter().map(off).fold(f64::INFINITY, f64::min);
     found.retain(|hit| off(hit) <= nearest + 0.01 * reach);
     let key = |hit: &Hit| (off(hit), hit.triangle);

@@ -215,7 +215,8 @@ impl TrianglePlane {
         segments: &mut Vec<ContactSegment>,
     ) {
         let tolerance = self.tolerance;
-        let height = corners.map(|p| self.height(p));
+        let other = OverPlane { corners: *corners, height: corners.map(|p| self.height(p)) };
+        let height = other.height;
         if height.iter().all(|&h| h > tolerance) || height.iter().all(|&h| h < -tolerance) {
             return;
         }
@@ -225,40 +226,57 @@ impl TrianglePlane {
         let [a, b, c] = *corners;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let is_coplanar = normal.dot(self.normal).abs() > COPLANAR_COSINE;
-        let point_at_height = |k: usize, l: usize, h: f64| {
-            let share = (h - height[k]) / (height[l] - height[k]);
-            corners[k].lerp(corners[l], share.clamp(0.0, 1.0))
-        };
-        let mut cut = vec![];
         for (k, l) in [(0, 1), (1, 2), (2, 0)] {
             let (low, high) = (height[k].min(height[l]), height[k].max(height[l]));
-            let crosses = !is_coplanar && low < 0.0 && high > 0.0;
             if outer[k] && low <= tolerance && high >= -tolerance {
-                // The end at corner k of the part within the tolerance.
-                let end = |k: usize, l: usize| {
-                    if height[k].abs() <= tolerance {
-                        corners[k]
-                    } else {
-                        point_at_height(k, l, tolerance * height[k].signum())
-                    }
-                };
-                let ends = [end(k, l), end(l, k)].map(|p| self.barycentric(p));
+                let ends = [(k, l), (l, k)].map(|(k, l)| other.end_within(tolerance, k, l));
+                let ends = ends.map(|p| self.barycentric(p));
+                let crosses = !is_coplanar && low < 0.0 && high > 0.0;
                 let gap = if crosses { 0.0 } else { low.abs().min(high.abs()) };
                 if ends[0] != ends[1] {
                     segments.push(ContactSegment { ends, gap });
                 }
             }
-            if crosses {
-                cut.push(self.barycentric(point_at_height(k, l, 0.0)));
-            }
         }
-        if cut.len() == 1 {
-            // The cut goes through the corner opposite.
-            let corner = (0..3).find(|&k| height[k] == 0.0);
-            cut.extend(corner.map(|k| self.barycentric(corners[k])));
+        if let Some(cut) = other.cut().filter(|_| !is_coplanar) {
+            segments.push(ContactSegment { ends: cut.map(|p| self.barycentric(p)), gap: 0.0 });
         }
-        if let [p, q] = cut[..] {
-            segments.push(ContactSegment { ends: [p, q], gap: 0.0 });
+    }
+}
+
+/// A triangle by the heights of its corners over a plane.
+struct OverPlane {
+    corners: [DVec3; 3],
+    height: [f64; 3],
+}
+
+impl OverPlane {
+    /// The point at height `h` of the side between corners `k` and `l`.
+    fn at_height(&self, h: f64, k: usize, l: usize) -> DVec3 {
+        let share = (h - self.height[k]) / (self.height[l] - self.height[k]);
+        self.corners[k].lerp(self.corners[l], share.clamp(0.0, 1.0))
+    }
+
+    /// The end at corner `k` of the part of the side to `l` that is within `tolerance` of the
+    /// plane.
+    fn end_within(&self, tolerance: f64, k: usize, l: usize) -> DVec3 {
+        if self.height[k].abs() <= tolerance {
+            return self.corners[k];
         }
+        self.at_height(tolerance * self.height[k].signum(), k, l)
+    }
+
+    /// The ends of the cut with the plane, if that goes through the triangle.
+    fn cut(&self) -> Option<[DVec3; 2]> {
+        let height = self.height;
+        let crosses = |(k, l): &(usize, usize)| {
+            height[*k].min(height[*l]) < 0.0 && height[*k].max(height[*l]) > 0.0
+        };
+        let sides = [(0, 1), (1, 2), (2, 0)].into_iter().filter(crosses);
+        let crossings = sides.map(|(k, l)| self.at_height(0.0, k, l));
+        // Of a single side, the cut goes through the corner opposite.
+        let corner = (0..3).find(|&k| height[k] == 0.0).map(|k| self.corners[k]);
+        let mut ends = crossings.chain(corner);
+        Some([ends.next()?, ends.next()?])
     }
 }

@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use crate::geometry::FILE_TOLERANCE;
 use crate::geometry::union_find::UnionFind;
 use crate::mesh::Mesh;
-use crate::scene::{Scene, Triangle};
+use crate::scene::{HalfEdge, Scene, Triangle};
 
 /// Identities shared across a smooth surface: one object or group, one material, no crease.
 #[derive(Clone)]
@@ -92,44 +92,25 @@ impl SurfaceTopology {
         crease_angle: impl Fn(&Triangle, &Triangle) -> f64 + Sync,
     ) -> SurfaceTopology {
         let count = scene.triangles().len();
-        let ends: Vec<[[u32; 2]; 3]> =
-            scene.welded_corners().0.iter().map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-        let mut sides: Vec<[Side; 3]> = (0..count)
-            .map(|t| {
-                [0, 1, 2].map(|k| {
-                    let [a, b] = ends[t][k];
-                    Side { id: (3 * t + k) as u32, reversed: a > b }
-                })
-            })
-            .collect();
-        // Sides between the same two positions come together, in the order of the triangles.
-        let ends = |&(t, k): &TriangleSide| {
-            let [a, b] = ends[t][k];
-            [a.min(b), a.max(b)]
-        };
-        let all = (0..count).flat_map(|t| [(t, 0), (t, 1), (t, 2)]);
-        let mut by_ends: Vec<([u32; 2], TriangleSide)> = all.map(|s| (ends(&s), s)).collect();
-        by_ends.par_sort_unstable();
-        let by_ends: Vec<TriangleSide> = by_ends.into_iter().map(|(_, side)| side).collect();
+        let half_edges = scene.half_edges();
+        let mut sides = vec![[Side { id: 0, reversed: false }; 3]; count];
         let mut edges = vec![[0; 3]; count];
-        for sharing in by_ends.chunk_by(|side, next| ends(side) == ends(next)) {
-            let edge = (3 * sharing[0].0 + sharing[0].1) as u32;
-            for &(t, k) in sharing {
-                edges[t][k] = edge;
+        for sharing in half_edges.chunk_by(HalfEdge::has_ends_of) {
+            for &HalfEdge { triangle: t, corner: k, reversed, .. } in sharing {
+                sides[t][k] = Side { id: (3 * t + k) as u32, reversed };
+                edges[t][k] = (3 * sharing[0].triangle + sharing[0].corner) as u32;
             }
         }
-        let continued = |sharing: &[TriangleSide]| {
-            let mut pairs = facing_pairs(scene, &sides, sharing);
+        let continued = |sharing: &[HalfEdge]| {
+            let mut pairs = facing_pairs(scene, sharing);
             pairs.retain(|&[(t, k), (s, l)]| {
                 let is_cut = scene.is_cut(t, k) || scene.is_cut(s, l);
                 !is_cut && continues(scene, t, s, &crease_angle)
             });
             pairs
         };
-        let pairs: Vec<[TriangleSide; 2]> = by_ends
-            .par_chunk_by(|side, next| ends(side) == ends(next))
-            .flat_map_iter(continued)
-            .collect();
+        let pairs: Vec<[TriangleSide; 2]> =
+            half_edges.par_chunk_by(HalfEdge::has_ends_of).flat_map_iter(continued).collect();
         let mut corners = UnionFind::new(3 * count);
         // No two of these share a side.
         for [(t, k), (s, l)] in pairs {
@@ -169,55 +150,47 @@ impl SurfaceTopology {
 /// Of triangles with sides between the same two positions, those whose fronts look into one wedge
 /// of space with no other triangle in between: the first to larger angles around the side, the
 /// second to smaller ones. Each is in one pair at most.
-fn facing_pairs(
-    scene: &Scene,
-    sides: &[[Side; 3]],
-    sharing: &[TriangleSide],
-) -> Vec<[TriangleSide; 2]> {
-    let looks_back = |(t, k): TriangleSide| sides[t][k].reversed;
-    if let &[t, s] = sharing {
+fn facing_pairs(scene: &Scene, sharing: &[HalfEdge]) -> Vec<[TriangleSide; 2]> {
+    let side = |edge: &HalfEdge| (edge.triangle, edge.corner);
+    if let [t, s] = sharing {
         // For two the order is irrelevant.
-        return if looks_back(t) == looks_back(s) { vec![] } else { vec![[t, s]] };
+        return if t.reversed == s.reversed { vec![] } else { vec![[side(t), side(s)]] };
     }
-    let mut around = by_angle(scene, sides, sharing);
+    let mut around = by_angle(scene, sharing);
     // Of coincident ones, those that face smaller angles come before those that face larger ones.
     let mut start = 0;
     for end in 1..=around.len() {
         if end == around.len() || around[end].0 - around[end - 1].0 > FILE_TOLERANCE {
-            around[start..end].sort_by_key(|&(_, side)| (!looks_back(side), side));
+            around[start..end].sort_by_key(|(_, edge)| (!edge.reversed, side(edge)));
             start = end;
         }
     }
     let next = around.iter().cycle().skip(1);
-    let pairs = around.iter().zip(next).map(|(&(_, t), &(_, s))| [t, s]);
-    pairs.filter(|&[t, s]| !looks_back(t) && looks_back(s)).collect()
+    let pairs = around.iter().zip(next).filter(|((_, t), (_, s))| !t.reversed && s.reversed);
+    pairs.map(|((_, t), (_, s))| [side(t), side(s)]).collect()
 }
 
 /// Triangles with sides between the same two positions, sorted by their angles around the side,
 /// radians, from the first.
-fn by_angle(
-    scene: &Scene,
-    sides: &[[Side; 3]],
-    sharing: &[TriangleSide],
-) -> Vec<(f64, TriangleSide)> {
+fn by_angle<'a>(scene: &Scene, sharing: &'a [HalfEdge]) -> Vec<(f64, &'a HalfEdge)> {
     // Within the triangle and at right angles to the side, along the same direction for all.
-    let across = |(t, k): TriangleSide| {
-        let corners = scene.corners(t);
+    let across = |edge: &HalfEdge| {
+        let (corners, k) = (scene.corners(edge.triangle), edge.corner);
         let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-        let along = if sides[t][k].reversed { a - b } else { b - a };
+        let along = if edge.reversed { a - b } else { b - a };
         let along = along.normalize();
         (along, (c - a).reject_from_normalized(along))
     };
-    let Some(&first) = sharing.first() else { return vec![] };
+    let Some(first) = sharing.first() else { return vec![] };
     let (axis, zero) = across(first);
     let quarter = axis.cross(zero);
-    let angle = |side: TriangleSide| {
-        let (_, out) = across(side);
+    let angle = |edge: &HalfEdge| {
+        let (_, out) = across(edge);
         // Triangles that coincide with the first have about its angle, on both sides of 0.
         let angle = out.dot(quarter).atan2(out.dot(zero));
         if angle < -FILE_TOLERANCE { angle + TAU } else { angle }
     };
-    let mut around: Vec<_> = sharing.iter().map(|&side| (angle(side), side)).collect();
+    let mut around: Vec<_> = sharing.iter().map(|edge| (angle(edge), edge)).collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0));
     around
 }

@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::Scene;
 use super::rgb::Rgb;
 use super::scene_textures::SceneTextures;
-use super::texture::{MAX_OUTLINE_CELLS, TextureMap};
+use super::texture::{MAX_OUTLINE_CELLS, TextureMap, spread_over};
 use super::textured::Piece;
 
 impl Scene {
@@ -131,7 +131,7 @@ impl TextureMap {
         let share = if is_exact && (b - a).perp_dot(c - a) != 0.0 {
             self.texture.mean_by_cells([a, b, c], self.clamped, cells).x
         } else {
-            let places = spread_over(corners, cells);
+            let places = spread_over(corners, points_across(cells));
             let (all, solid) = places.fold((0.0, 0.0), |(all, solid), uv| {
                 (all + 1.0, solid + f64::from(u8::from(self.is_solid(uv))))
             });
@@ -156,7 +156,8 @@ impl TextureMap {
             0.0 => None,
             1.0 => Some(self.mean_by_cells(corners, cells)),
             _ => {
-                let solid = spread_over(corners, cells).filter(|&uv| mask.is_solid(uv));
+                let solid =
+                    spread_over(corners, points_across(cells)).filter(|&uv| mask.is_solid(uv));
                 let (sum, count) = solid
                     .fold((Rgb::ZERO, 0.0), |(sum, count), uv| (sum + self.texel(uv), count + 1.0));
                 (count > 0.0).then(|| sum / count)
@@ -171,15 +172,7 @@ impl TextureMap {
     }
 }
 
-/// Points spread evenly over a triangle with a limit of `cells` along its outline: a square of them
-/// folded onto it.
-fn spread_over([a, b, c]: [DVec2; 3], cells: f64) -> impl Iterator<Item = DVec2> {
-    let n = (48.0 * cells / MAX_OUTLINE_CELLS).clamp(8.0, 48.0) as u32;
-    (0..n).flat_map(move |i| (0..n).map(move |j| [i, j])).map(move |ij| {
-        let [mut s, mut t] = ij.map(|k| (f64::from(k) + 0.5) / f64::from(n));
-        if s + t > 1.0 {
-            (s, t) = (1.0 - s, 1.0 - t);
-        }
-        a + s * (b - a) + t * (c - a)
-    })
+/// Points on the sides of a triangle's square of points, for `cells` cells along its outline.
+fn points_across(cells: f64) -> u32 {
+    (48.0 * cells / MAX_OUTLINE_CELLS).clamp(8.0, 48.0) as u32
 }

@@ -72,7 +72,7 @@ struct Shell {
     is_cavity: bool,
 }
 
-/// A triangle of glass by its corners' numbers; the first of duplicates.
+/// A triangle of glass by its corners' numbers.
 #[derive(Clone, Copy)]
 struct Face {
     triangle: usize,
@@ -81,47 +81,30 @@ struct Face {
 
 impl GlassBodies {
     pub fn new(scene: &Scene) -> GlassBodies {
-        let glass = |&t: &usize| scene.material(t).specular.is_some_and(|s| s.is_glass());
-        let mut weld = Weld::default();
-        let (mut unique, mut numbers) = (vec![], FxHashMap::default());
-        // Per triangle of glass: itself, and the first with its corners and material.
-        let mut all = vec![];
-        for t in (0..scene.triangles().len()).filter(glass) {
-            let corners = scene.corners(t).map(|p| weld.number(p));
-            let mut key = corners;
-            key.sort_unstable();
-            let number =
-                *numbers.entry((scene.triangles()[t].material, key)).or_insert_with(|| {
-                    unique.push(Face { triangle: t, corners });
-                    unique.len() - 1
-                });
-            all.push((t, corners, number));
-        }
-        let found = shells(scene, &unique);
-        let mut bodies = {
-            let count = scene.triangles().len();
-            let (is_copy, is_layer) = (vec![false; count], vec![false; count]);
-            GlassBodies { faces: vec![None; count], is_copy, is_layer, shells: vec![] }
+        let (all, unique) = glass_faces(scene);
+        let count = scene.triangles().len();
+        let mut bodies = GlassBodies {
+            faces: vec![None; count],
+            is_copy: vec![false; count],
+            is_layer: vec![false; count],
+            shells: vec![],
         };
-        let of_faces: Vec<Option<(u32, bool)>> = {
-            let mut of_faces = vec![None; unique.len()];
-            for (members, outward) in found {
-                let shell = Shell::new(scene, &unique, &members, &outward);
-                let Some((shell, flipped)) = shell else {
-                    members.iter().for_each(|&k| bodies.is_layer[unique[k].triangle] = true);
-                    continue;
-                };
-                for (&k, outward) in members.iter().zip(outward) {
-                    of_faces[k] = Some((bodies.shells.len() as u32, outward != flipped));
-                }
-                bodies.shells.push(shell);
+        // The shell of each of the unique faces, and whether it faces out of that.
+        let mut of_faces: Vec<Option<(usize, bool)>> = vec![None; unique.len()];
+        for (members, outward) in shells(scene, &unique) {
+            let Some((shell, flipped)) = Shell::new(scene, &unique, &members, &outward) else {
+                members.iter().for_each(|&k| bodies.is_layer[unique[k].triangle] = true);
+                continue;
+            };
+            for (&k, outward) in members.iter().zip(outward) {
+                of_faces[k] = Some((bodies.shells.len(), outward != flipped));
             }
-            of_faces
-        };
+            bodies.shells.push(shell);
+        }
         bodies.nest();
-        for (t, corners, number) in all {
+        for (Face { triangle: t, corners }, number) in all {
             let face = of_faces[number].map(|(shell, outward)| {
-                let Shell { body, is_cavity, .. } = bodies.shells[shell as usize];
+                let Shell { body, is_cavity, .. } = bodies.shells[shell];
                 let alike = same_way_round(corners, unique[number].corners);
                 GlassFace::Boundary { body, front_is_outside: (outward == alike) != is_cavity }
             });
@@ -239,6 +222,28 @@ impl Shell {
         let is_near = point.cmpge(low).all() && point.cmple(high).all();
         is_near && self.triangles.iter().map(|t| solid_angle(*t, point)).sum::<f64>() > TAU
     }
+}
+
+/// All triangles of glass, each with the number of the first that has its corners and material; and
+/// these.
+fn glass_faces(scene: &Scene) -> (Vec<(Face, usize)>, Vec<Face>) {
+    let is_glass = |&t: &usize| scene.material(t).specular.is_some_and(|s| s.is_glass());
+    let mut weld = Weld::default();
+    let (mut unique, mut numbers) = (vec![], FxHashMap::default());
+    let face = |triangle: usize| {
+        let corners = scene.corners(triangle).map(|p| weld.number(p));
+        let mut key = corners;
+        key.sort_unstable();
+        let face = Face { triangle, corners };
+        let number = numbers.entry((scene.triangles()[triangle].material, key));
+        let number = *number.or_insert_with(|| {
+            unique.push(face);
+            unique.len() - 1
+        });
+        (face, number)
+    };
+    let all = (0..scene.triangles().len()).filter(is_glass).map(face).collect();
+    (all, unique)
 }
 
 /// The closed surfaces of `faces`: the members of each, and which of them have equal winding.

@@ -13,12 +13,13 @@ use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use serde::Serialize;
 
 use crate::error::{Error, ErrorKind};
 
 /// Intensity by direction, W/sr; candela if a scene's numbers are photometric. Bilinear in the two
 /// angles; 0 outside the given angles.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntensityDistribution {
     /// Radians, ascending; a single one means rotational symmetry.
     azimuths: Vec<f64>,
@@ -30,7 +31,7 @@ pub struct IntensityDistribution {
 }
 
 /// The axis of a luminaire that the angles of an [`IntensityDistribution`] turn around.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Pole {
     /// The aim; azimuths from C = 0° towards C = 90°. Type C of the IES, and EULUMDAT.
     #[default]
@@ -166,17 +167,6 @@ impl IntensityDistribution {
     fn is_closed(&self) -> bool {
         let span = self.azimuths[self.azimuths.len() - 1] - self.azimuths[0];
         span >= TAU - TURN_TOLERANCE.to_radians()
-    }
-
-    /// Numbers that are equal for equal distributions.
-    pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
-        let pole = match self.pole {
-            Pole::Aim => 0.0,
-            Pole::C0 => 1.0,
-            Pole::C90 => 2.0,
-        };
-        let angles = self.azimuths.iter().chain(&self.polar);
-        angles.chain(&self.values).copied().chain([pole])
     }
 }
 

@@ -14,6 +14,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use serde::Serialize;
 
 use super::{IntensityDistribution, Rgb, Scene, WarningKind};
 use crate::error::{Error, ErrorKind};
@@ -37,7 +38,7 @@ pub struct Luminaire {
 }
 
 /// The luminous part of a luminaire: a box or an upright cylinder, flat or of no size at all.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Opening {
     /// Extent along C = 0°, along C = 90° and along the aim; scene unit, metres in files.
     pub size: DVec3,
@@ -141,14 +142,6 @@ impl Luminaire {
         let far = self.intensity.along(DVec3::from_array(local)) * cosine;
         let irradiance = far / (distance * distance);
         if irradiance.is_finite() { irradiance } else { 0.0 }
-    }
-
-    /// Numbers that are equal for equal luminaires.
-    pub(crate) fn key(&self) -> impl Iterator<Item = f64> {
-        let Luminaire { position, aim, c0, opening, scale, .. } = self;
-        let vectors = [*position, *aim, *c0, opening.size, *scale];
-        let vectors = vectors.into_iter().flat_map(|v| v.to_array());
-        vectors.chain([f64::from(u8::from(opening.is_round))]).chain(self.intensity.key())
     }
 }
 

@@ -12,6 +12,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use serde::Serialize;
 
 use super::sky_distribution::SkyDistribution;
 use super::sky_map::SkyMap;
@@ -29,7 +30,7 @@ pub struct Sky {
 }
 
 /// The sun: a distant disc, half a degree wide, of uniform brightness.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sun {
     /// Direction of its centre; of any length.
     pub direction: DVec3,
@@ -167,21 +168,6 @@ impl Sky {
     /// The pieces; none if the sky is uniform.
     pub(crate) fn map(&self) -> Option<&SkyMap> {
         self.map.as_deref()
-    }
-
-    /// Numbers that are equal for equal skies; none for a black one.
-    pub(crate) fn key(&self) -> Vec<f64> {
-        if self.is_black() {
-            return vec![];
-        }
-        let mut numbers = self.uniform.to_array().to_vec();
-        if let Some(map) = &self.map {
-            numbers.extend(map.key());
-        }
-        if let Some(Sun { direction, irradiance }) = self.sun {
-            numbers.extend(direction.to_array().into_iter().chain(irradiance.to_array()));
-        }
-        numbers
     }
 }
 

@@ -11,11 +11,12 @@
 //! Shaders use the same mapping: `shaders/sky.wgsl`.
 
 use glam::{DQuat, DVec3};
+use serde::Serialize;
 
 use super::Rgb;
 
 /// The radiance of a sky, piece by piece.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct SkyMap {
     /// Rotation from the scene's axes to the map's, whose zenith is +z.
     turn: DQuat,
@@ -101,12 +102,6 @@ impl SkyMap {
     /// W/(m² sr) per channel, the first square line by line, then the second.
     pub fn pieces(&self) -> &[[f32; 3]] {
         &self.pieces
-    }
-
-    /// Numbers that are equal for equal maps.
-    pub fn key(&self) -> impl Iterator<Item = f64> {
-        let pieces = self.pieces.iter().flatten().map(|&x| f64::from(x));
-        self.turn.to_array().into_iter().chain(pieces)
     }
 }
 

@@ -193,18 +193,9 @@ impl Texture {
     }
 
     /// The mean of points spread evenly over a triangle.
-    fn sampled_mean(&self, [a, b, c]: [DVec2; 3]) -> Rgb {
+    fn sampled_mean(&self, corners: [DVec2; 3]) -> Rgb {
         let n = 48;
-        let mut sum = Rgb::ZERO;
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            // The square of points folded onto the triangle.
-            let [mut s, mut t] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(n));
-            if s + t > 1.0 {
-                (s, t) = (1.0 - s, 1.0 - t);
-            }
-            sum += self.at(a + s * (b - a) + t * (c - a), true);
-        }
-        sum / f64::from(n * n)
+        spread_over(corners, n).map(|uv| self.at(uv, true)).sum::<Rgb>() / f64::from(n * n)
     }
 
     /// Linear mean of a cell: a texel at level 0.
@@ -253,6 +244,17 @@ impl std::fmt::Debug for Texture {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Texture({} × {})", self.width, self.height)
     }
+}
+
+/// `n`² points spread evenly over a triangle: a square of them folded onto it.
+pub(super) fn spread_over([a, b, c]: [DVec2; 3], n: u32) -> impl Iterator<Item = DVec2> {
+    (0..n).flat_map(move |i| (0..n).map(move |j| [i, j])).map(move |ij| {
+        let [mut s, mut t] = ij.map(|k| (f64::from(k) + 0.5) / f64::from(n));
+        if s + t > 1.0 {
+            (s, t) = (1.0 - s, 1.0 - t);
+        }
+        a + s * (b - a) + t * (c - a)
+    })
 }
 
 /// Linear colour of an 8-bit sRGB texel.

@@ -22,76 +22,132 @@ pub struct Warning {
     pub names: Vec<String>,
 }
 
-/// Kind of a [`Warning`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum WarningKind {
+/// The kinds: documentation, name, noun in singular and plural, and the remedy where a strict
+/// reader refuses the file.
+macro_rules! warning_kinds {
+    ($($(#[$doc:meta])* $kind:ident: $one:literal, $many:literal $(=> $remedy:literal)?;)*) => {
+        /// Kind of a [`Warning`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum WarningKind {
+            $($(#[$doc])* $kind,)*
+        }
+
+        impl WarningKind {
+            /// Its noun, singular and plural.
+            pub(crate) fn nouns(self) -> (&'static str, &'static str) {
+                match self {
+                    $(WarningKind::$kind => ($one, $many),)*
+                }
+            }
+
+            /// The remedy, if a strict reader refuses it; `None` if it only warns: nothing was
+            /// changed, or the skipped content does not belong in a scene of surfaces.
+            pub(crate) fn remedy(self) -> Option<&'static str> {
+                match self {
+                    $($(WarningKind::$kind => Some($remedy),)?)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+warning_kinds! {
     /// A library of materials that cannot be read.
-    MissingLibrary,
+    MissingLibrary: "missing library", "missing libraries"
+        => "put the library into the folder of the OBJ file or below";
     /// A library under another path, with other capitalisation, or one that no `mtllib` names.
-    LibraryElsewhere,
+    LibraryElsewhere: "library not where it is said", "libraries not where it is said"
+        => "name it by its path from the folder of the OBJ file";
     /// `usemtl` with a name that no library defines, or with none.
-    UnknownMaterial,
+    UnknownMaterial: "unknown material", "unknown materials"
+        => "define it with `newmtl` in a library that `mtllib` names";
     /// A face before the first `usemtl`.
-    FaceWithoutMaterial,
+    FaceWithoutMaterial: "face without a material", "faces without a material";
     /// A material with neither reflectance nor radiance.
-    MaterialWithoutColour,
+    MaterialWithoutColour:
+        "material with neither `Kd` nor `Ke`",
+        "materials with neither `Kd` nor `Ke`";
     /// A material that is defined several times.
-    RedefinedMaterial,
+    RedefinedMaterial: "material with several definitions", "materials with several definitions";
     /// A reflectance of 1 or more in a channel.
-    HighReflectance,
+    HighReflectance:
+        "material with a reflectance of 1 or more",
+        "materials with reflectances of 1 or more"
+        => "a diffuse reflectance is at least 0 and below 1 in each channel";
     /// A reflectance or radiance below 0 in a channel.
-    NegativeColour,
+    NegativeColour: "material with a negative colour", "materials with negative colours"
+        => "reflectance and radiance are at least 0 in each channel";
     /// A statement of a material that cannot be read.
-    MaterialStatement,
+    MaterialStatement: "unusable statement of a material", "unusable statements of materials"
+        => "begin with `newmtl NAME`; write three finite numbers r g b, or one for all three";
     /// A missing texture.
-    MissingTexture,
+    MissingTexture: "texture that is not there", "textures that are not there"
+        => "put the image, as PNG, JPEG, BMP or TGA, into the folder of the OBJ file";
     /// A texture that is not an image, or is truncated.
-    UnreadableTexture,
+    UnreadableTexture: "texture that cannot be read", "textures that cannot be read"
+        => "give a whole image, as PNG, JPEG, BMP or TGA";
     /// A texture that exceeds the limits, alone or with those before it.
-    LargeTexture,
+    LargeTexture: "texture that is too large", "textures that are too large"
+        => "make images smaller: a side of 32768 texels, 134217728 in all";
     /// Options of a texture that are not used.
-    TextureOptions,
+    TextureOptions:
+        "texture with options that are not used",
+        "textures with options that are not used";
     /// Transparency, which is not modelled.
-    Transparency,
+    Transparency: "material with transparency", "materials with transparency";
     /// A mirror or glass, which pictures show and the light solution simplifies.
-    Specular,
+    Specular: "material of mirror or glass", "materials of mirror or glass";
     /// `Ka` above 1, used as radiance.
-    AmbientAsRadiance,
+    AmbientAsRadiance: "material with `Ka` above 1", "materials with `Ka` above 1"
+        => "write `Ke` for emitted radiance";
     /// No face emits light.
-    NoLight,
+    NoLight: "no light in the scene", "scenes without light";
     /// A polygon that crosses itself, or has too many corners, or no front.
-    Polygon,
+    Polygon: "polygon that crosses itself", "polygons that cross themselves"
+        => "its outline must not cross itself, and may have 10000 corners unless it is convex; \
+            triangles always work";
     /// A face that names a corner twice in a row.
-    RepeatedCorner,
+    RepeatedCorner: "corner given twice in a row", "corners given twice in a row"
+        => "name each corner once";
     /// A face with fewer than three different corners.
-    FewCorners,
+    FewCorners: "face of fewer than three corners", "faces of fewer than three corners"
+        => "a face has three corners or more";
     /// A vertex with more numbers than a position, a weight or a colour has.
-    VertexNumbers,
+    VertexNumbers: "vertex with too many numbers", "vertices with too many numbers"
+        => "a vertex is `v x y z`, with a weight or a colour at most";
     /// A smoothing group that is not an integer.
-    SmoothingGroup,
+    SmoothingGroup:
+        "smoothing group that is no whole number",
+        "smoothing groups that are no whole numbers"
+        => "write `s off`, or `s` and a whole number up to 4294967295";
     /// `s` with neither a group nor `off`.
-    SmoothingWithoutGroup,
+    SmoothingWithoutGroup: "`s` line without a group", "`s` lines without a group";
     /// Points and lines.
-    PointsAndLines,
+    PointsAndLines: "`p` or `l` line (points, lines)", "`p` and `l` lines (points, lines)";
     /// Free-form curves and surfaces.
-    FreeForm,
+    FreeForm: "line of free-form curves or surfaces", "lines of free-form curves or surfaces";
     /// A line that is not OBJ.
-    UnknownStatement,
+    UnknownStatement: "line of unknown kind", "lines of unknown kind";
     /// A facet of an STL file whose normal points to the back of its corners.
-    OpposedNormal,
+    OpposedNormal:
+        "facet with a normal that its corners contradict",
+        "facets with normals that their corners contradict"
+        => "seen from where the normal points, corners run counter-clockwise";
     /// An STL file that is truncated, or has another length than it declares.
-    BrokenOff,
+    BrokenOff: "file that breaks off", "files that break off"
+        => "give the whole file";
     /// A text that is not UTF-8.
-    Encoding,
+    Encoding: "text that is not UTF-8", "texts that are not UTF-8";
     /// A triangle without area.
-    Degenerate,
+    Degenerate: "triangle without area", "triangles without area";
     /// A duplicated triangle.
-    RepeatedTriangle,
+    RepeatedTriangle: "triangle given again", "triangles given again";
     /// A triangle that light reaches from behind only.
-    Winding,
+    Winding: "triangle lit from behind", "triangles lit from behind";
     /// A triangle that light reaches on both sides.
-    BothSides,
+    BothSides: "triangle lit from both sides", "triangles lit from both sides";
 }
 
 impl Warning {
@@ -144,105 +200,6 @@ impl fmt::Display for Warning {
             write!(f, " ({}{others})", quoted(shown))?;
         }
         Ok(())
-    }
-}
-
-impl WarningKind {
-    /// Its noun, singular and plural.
-    pub(crate) fn nouns(self) -> (&'static str, &'static str) {
-        use WarningKind::*;
-        match self {
-            MissingLibrary => ("missing library", "missing libraries"),
-            LibraryElsewhere => ("library not where it is said", "libraries not where it is said"),
-            UnknownMaterial => ("unknown material", "unknown materials"),
-            FaceWithoutMaterial => ("face without a material", "faces without a material"),
-            MaterialWithoutColour => {
-                ("material with neither `Kd` nor `Ke`", "materials with neither `Kd` nor `Ke`")
-            }
-            RedefinedMaterial => {
-                ("material with several definitions", "materials with several definitions")
-            }
-            HighReflectance => (
-                "material with a reflectance of 1 or more",
-                "materials with reflectances of 1 or more",
-            ),
-            NegativeColour => {
-                ("material with a negative colour", "materials with negative colours")
-            }
-            MaterialStatement => {
-                ("unusable statement of a material", "unusable statements of materials")
-            }
-            MissingTexture => ("texture that is not there", "textures that are not there"),
-            UnreadableTexture => ("texture that cannot be read", "textures that cannot be read"),
-            LargeTexture => ("texture that is too large", "textures that are too large"),
-            TextureOptions => (
-                "texture with options that are not used",
-                "textures with options that are not used",
-            ),
-            Transparency => ("material with transparency", "materials with transparency"),
-            Specular => ("material of mirror or glass", "materials of mirror or glass"),
-            AmbientAsRadiance => ("material with `Ka` above 1", "materials with `Ka` above 1"),
-            NoLight => ("no light in the scene", "scenes without light"),
-            Polygon => ("polygon that crosses itself", "polygons that cross themselves"),
-            RepeatedCorner => ("corner given twice in a row", "corners given twice in a row"),
-            FewCorners => ("face of fewer than three corners", "faces of fewer than three corners"),
-            VertexNumbers => ("vertex with too many numbers", "vertices with too many numbers"),
-            SmoothingGroup => (
-                "smoothing group that is no whole number",
-                "smoothing groups that are no whole numbers",
-            ),
-            SmoothingWithoutGroup => ("`s` line without a group", "`s` lines without a group"),
-            PointsAndLines => {
-                ("`p` or `l` line (points, lines)", "`p` and `l` lines (points, lines)")
-            }
-            FreeForm => {
-                ("line of free-form curves or surfaces", "lines of free-form curves or surfaces")
-            }
-            UnknownStatement => ("line of unknown kind", "lines of unknown kind"),
-            OpposedNormal => (
-                "facet with a normal that its corners contradict",
-                "facets with normals that their corners contradict",
-            ),
-            BrokenOff => ("file that breaks off", "files that break off"),
-            Encoding => ("text that is not UTF-8", "texts that are not UTF-8"),
-            Degenerate => ("triangle without area", "triangles without area"),
-            RepeatedTriangle => ("triangle given again", "triangles given again"),
-            Winding => ("triangle lit from behind", "triangles lit from behind"),
-            BothSides => ("triangle lit from both sides", "triangles lit from both sides"),
-        }
-    }
-
-    /// The remedy, if a strict reader refuses it; `None` if it only warns: nothing was changed, or
-    /// the skipped content does not belong in a scene of surfaces.
-    pub(crate) fn remedy(self) -> Option<&'static str> {
-        use WarningKind::*;
-        Some(match self {
-            MissingTexture => {
-                "put the image, as PNG, JPEG, BMP or TGA, into the folder of the OBJ file"
-            }
-            UnreadableTexture => "give a whole image, as PNG, JPEG, BMP or TGA",
-            LargeTexture => "make images smaller: a side of 32768 texels, 134217728 in all",
-            MissingLibrary => "put the library into the folder of the OBJ file or below",
-            LibraryElsewhere => "name it by its path from the folder of the OBJ file",
-            UnknownMaterial => "define it with `newmtl` in a library that `mtllib` names",
-            HighReflectance => "a diffuse reflectance is at least 0 and below 1 in each channel",
-            NegativeColour => "reflectance and radiance are at least 0 in each channel",
-            MaterialStatement => {
-                "begin with `newmtl NAME`; write three finite numbers r g b, or one for all three"
-            }
-            Polygon => {
-                "its outline must not cross itself, and may have 10000 corners unless it is \
-                 convex; triangles always work"
-            }
-            RepeatedCorner => "name each corner once",
-            FewCorners => "a face has three corners or more",
-            VertexNumbers => "a vertex is `v x y z`, with a weight or a colour at most",
-            SmoothingGroup => "write `s off`, or `s` and a whole number up to 4294967295",
-            OpposedNormal => "seen from where the normal points, corners run counter-clockwise",
-            BrokenOff => "give the whole file",
-            AmbientAsRadiance => "write `Ke` for emitted radiance",
-            _ => return None,
-        })
     }
 }
 

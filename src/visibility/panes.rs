@@ -3,7 +3,6 @@
 //! Panes have a separate bounding volume hierarchy, which is traversed once the end is known: rays
 //! to surfaces do not hit panes, and a scene without panes has no such hierarchy.
 
-use std::cell::{Cell, RefCell};
 use std::ops::Range;
 
 use glam::DVec3;
@@ -58,21 +57,19 @@ impl Panes {
     }
 
     fn passed(&self, rays: &RayScene, from: DVec3, direction: DVec3, reach: Range<f64>) -> Rgb {
-        let passed = Cell::new(Rgb::ONE);
-        let seams: RefCell<Vec<(f64, Rgb)>> = RefCell::default();
+        let (mut passed, mut seams) = (Rgb::ONE, vec![]);
         let reach = reach.start..reach.end * (1.0 - COINCIDENCE_TOLERANCE);
         rays.occluded(from, direction, reach, |hit| {
             let share = self.transmittance[hit.triangle];
             // The edge between two triangles, which both report: above the tolerance of the hits,
             // 1e-12.
             if hit.u.min(hit.v).min(1.0 - hit.u - hit.v) > 1e-11 {
-                passed.set(passed.get() * share);
+                passed *= share;
             } else {
-                seams.borrow_mut().push((hit.distance, share));
+                seams.push((hit.distance, share));
             }
             false
         });
-        let (mut passed, seams) = (passed.get(), seams.into_inner());
         for (k, &(distance, share)) in seams.iter().enumerate() {
             let same = |other: &(f64, Rgb)| {
                 other.1 == share

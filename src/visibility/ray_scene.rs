@@ -8,7 +8,7 @@
 //!
 //! Rays do not hit backs covered by coinciding fronts ([`Scene::is_back_covered`]), clear panes
 //! ([`Scene::is_clear`]; for their transmittance see [`Panes`](super::panes::Panes)), or holes
-//! ([`CutOuts`], looked up at hits). Whether there are holes is tested once per ray.
+//! ([`CutOuts`], looked up at hits).
 //!
 //! The hierarchy only prunes: its margins are above 32-bit rounding, so that no hit is lost between
 //! it and the exact test. Of hits at equal distances the lowest triangle index wins, whatever the
@@ -143,26 +143,12 @@ impl RayScene {
         ignored: Option<usize>,
         counts: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
-        match &self.cut_outs {
-            None => self.nearest(from, direction, start, ignored, counts),
-            Some(holes) => self.nearest(from, direction, start, ignored, solid_hits(holes, counts)),
-        }
-    }
-
-    fn nearest(
-        &self,
-        from: DVec3,
-        direction: DVec3,
-        start: f64,
-        ignored: Option<usize>,
-        counts: impl Fn(&Hit) -> bool,
-    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let (mut ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
         self.bvh.trace(Child::ROOT, &mut ray, |k| {
             let plane = &self.triangles[k];
             let hit = plane.nearer((from, direction), start, ignored, best)?;
-            if !counts(&hit) {
+            if !self.is_solid(&hit) || !counts(&hit) {
                 return None;
             }
             best = Some(hit);
@@ -185,13 +171,7 @@ impl RayScene {
         while directions.peek().is_some() {
             let stream: ArrayVec<DVec3, MAX_STREAM> =
                 directions.by_ref().take(MAX_STREAM).collect();
-            let hits = match &self.cut_outs {
-                None => self.nearest_of_stream(from, &stream, start, ignored, |_| true),
-                Some(holes) => {
-                    let counts = solid_hits(holes, |_| true);
-                    self.nearest_of_stream(from, &stream, start, ignored, counts)
-                }
-            };
+            let hits = self.nearest_of_stream(from, &stream, start, ignored);
             stream.into_iter().zip(hits).for_each(|(direction, hit)| visit(direction, hit));
         }
     }
@@ -202,7 +182,6 @@ impl RayScene {
         directions: &[DVec3],
         start: f64,
         ignored: Option<usize>,
-        counts: impl Fn(&Hit) -> bool,
     ) -> ArrayVec<Option<Hit>, MAX_STREAM> {
         let mut best: ArrayVec<Option<Hit>, MAX_STREAM> = directions.iter().map(|_| None).collect();
         let local = |&d: &DVec3| self.unit.ray(from, d, start..f64::INFINITY);
@@ -210,7 +189,7 @@ impl RayScene {
         self.bvh.trace_stream(&mut rays, |ray, k| {
             let plane = &self.triangles[k];
             let hit = plane.nearer((from, directions[ray]), start, ignored, best[ray])?;
-            if !counts(&hit) {
+            if !self.is_solid(&hit) {
                 return None;
             }
             best[ray] = Some(hit);
@@ -226,36 +205,25 @@ impl RayScene {
         from: DVec3,
         direction: DVec3,
         reach: Range<f64>,
-        counts: impl Fn(&Hit) -> bool,
-    ) -> bool {
-        match &self.cut_outs {
-            None => self.any(from, direction, reach, counts),
-            Some(holes) => self.any(from, direction, reach, solid_hits(holes, counts)),
-        }
-    }
-
-    fn any(
-        &self,
-        from: DVec3,
-        direction: DVec3,
-        reach: Range<f64>,
-        counts: impl Fn(&Hit) -> bool,
+        mut counts: impl FnMut(&Hit) -> bool,
     ) -> bool {
         let (mut ray, _) = self.unit.ray(from, direction, reach.clone());
         let mut blocked = false;
         self.bvh.trace(Child::ROOT, &mut ray, |k| {
             let hit = self.triangles[k].intersect(from, direction, reach.clone());
-            blocked |= hit.is_some_and(|h| counts(&h));
+            blocked |= hit.is_some_and(|hit| self.is_solid(&hit) && counts(&hit));
             // Ends the traversal.
             blocked.then_some(f32::NEG_INFINITY)
         });
         blocked
     }
-}
 
-/// The hits for which `counts` is true and that are not in `holes`.
-fn solid_hits(holes: &CutOuts, counts: impl Fn(&Hit) -> bool) -> impl Fn(&Hit) -> bool {
-    move |hit| holes.is_solid(hit.triangle, [hit.u, hit.v]) && counts(hit)
+    /// Whether a hit is in no hole.
+    #[inline(always)]
+    fn is_solid(&self, hit: &Hit) -> bool {
+        let is_solid = |holes: &CutOuts| holes.is_solid(hit.triangle, [hit.u, hit.v]);
+        self.cut_outs.as_ref().is_none_or(is_solid)
+    }
 }
 
 #[cfg(test)]

@@ -38,13 +38,9 @@ impl WideBvh {
         mut may_meet: impl FnMut(usize, usize) -> Option<f32>,
     ) {
         let Some(&Ray32 { origin, .. }) = rays.first() else { return };
-        // Rays that reach each open child, one list after the other, and where the last ones begin.
-        let mut waiting: Vec<u8> = (0..rays.len() as u8).collect();
-        let mut open = vec![(Child::ROOT, 0)];
-        while let Some((child, begin)) = open.pop() {
-            let mut active = Rays::new();
-            let _ = active.try_extend_from_slice(&waiting[begin..]);
-            waiting.truncate(begin);
+        let mut open = OpenChildren { waiting: (0..rays.len() as u8).collect(), begins: vec![] };
+        open.begins.push((Child::ROOT, 0));
+        while let Some((child, active)) = open.pop() {
             if let &[ray] = active.as_slice() {
                 let ray = usize::from(ray);
                 self.trace(child, &mut rays[ray], |triangle| may_meet(ray, triangle));
@@ -64,36 +60,53 @@ impl WideBvh {
                         .collect();
                     order.sort_unstable();
                     for &(_, k) in order.iter().rev() {
-                        let begin = waiting.len();
-                        open.push((node.children[k], begin));
-                        // Without a branch: hits are unpredictable.
-                        waiting.resize(begin + active.len(), 0);
-                        let mut end = begin;
-                        for (&ray, mask) in active.iter().zip(&masks) {
-                            waiting[end] = ray;
-                            end += (mask >> k & 1) as usize;
-                        }
-                        waiting.truncate(end);
+                        open.push(node.children[k], &active, |ray| masks[ray] >> k & 1);
                     }
                 }
                 ChildKind::Pack(pack) => {
                     let pack = &self.packs[pack];
                     let seen = pack.seen_from(origin);
-                    for &ray in &active {
-                        let number = usize::from(ray);
-                        let ray = &mut rays[number];
-                        let mut lanes = seen.may_meet(ray);
-                        while lanes != 0 {
-                            let lane = lanes.trailing_zeros() as usize;
-                            if let Some(end) = may_meet(number, pack.first as usize + lane) {
-                                ray.end = end;
-                            }
-                            lanes &= lanes - 1;
-                        }
+                    for ray in active.iter().map(|&ray| usize::from(ray)) {
+                        seen.trace(pack.first, &mut rays[ray], |k| may_meet(ray, k));
                     }
                 }
             }
         }
+    }
+}
+
+/// Children to be entered, the next at the end.
+struct OpenChildren {
+    /// Rays that reach each child, one list after the other.
+    waiting: Vec<u8>,
+    /// Each with the beginning of its list.
+    begins: Vec<(Child, usize)>,
+}
+
+impl OpenChildren {
+    /// The next child, and the rays that reach it.
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(Child, Rays)> {
+        let (child, begin) = self.begins.pop()?;
+        let mut rays = Rays::new();
+        let _ = rays.try_extend_from_slice(&self.waiting[begin..]);
+        self.waiting.truncate(begin);
+        Some((child, rays))
+    }
+
+    /// Adds a child with those of `rays` whose `bit`, by their position among these, is 1.
+    #[inline(always)]
+    fn push(&mut self, child: Child, rays: &Rays, bit: impl Fn(usize) -> u32) {
+        let begin = self.waiting.len();
+        self.begins.push((child, begin));
+        // Without a branch: hits are unpredictable.
+        self.waiting.resize(begin + rays.len(), 0);
+        let mut end = begin;
+        for (k, &ray) in rays.iter().enumerate() {
+            self.waiting[end] = ray;
+            end += bit(k) as usize;
+        }
+        self.waiting.truncate(end);
     }
 }
 

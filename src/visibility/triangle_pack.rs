@@ -83,9 +83,28 @@ impl TrianglePack {
 }
 
 impl PackSeen {
+    /// Calls `may_meet` with each triangle that `ray` may hit before its end, by their indices in
+    /// the order of the tree, where the `first` of the pack is known. It may return a new end.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        first: u32,
+        ray: &mut Ray32,
+        mut may_meet: impl FnMut(usize) -> Option<f32>,
+    ) {
+        let mut hits = self.may_meet(ray);
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize;
+            if let Some(end) = may_meet(first as usize + lane) {
+                ray.end = end;
+            }
+            hits &= hits - 1;
+        }
+    }
+
     /// Mask of the triangles that `ray` may hit, one bit each.
     #[inline(always)]
-    pub fn may_meet(&self, ray: &Ray32) -> u32 {
+    fn may_meet(&self, ray: &Ray32) -> u32 {
         let d = splat(ray.direction);
         let (facing, u, v) = (dot(&d, &self.normal), dot(&d, &self.u), dot(&d, &self.v));
         let front = facing.cmpge(Vec4::ZERO);

@@ -135,14 +135,7 @@ impl WideBvh {
                 }
                 ChildKind::Pack(pack) => {
                     let pack = &self.packs[pack];
-                    let mut hits = pack.seen_from(ray.origin).may_meet(ray);
-                    while hits != 0 {
-                        let lane = hits.trailing_zeros() as usize;
-                        if let Some(end) = may_meet(pack.first as usize + lane) {
-                            ray.end = end;
-                        }
-                        hits &= hits - 1;
-                    }
+                    pack.seen_from(ray.origin).trace(pack.first, ray, &mut may_meet);
                 }
             }
             // Boxes that begin beyond the end of the ray are skipped.

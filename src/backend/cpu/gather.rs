@@ -22,6 +22,7 @@ mod wide_light;
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
@@ -140,6 +141,24 @@ impl RayGather {
         self.scene.luminaires()
     }
 
+    /// Calls `visit` with the number, from 1, the direction and the hit of each ray of `range` from
+    /// `point`.
+    fn cast(
+        &self,
+        point: &GatherPoint,
+        rotation: f64,
+        range: Range<u32>,
+        mut visit: impl FnMut(u32, DVec3, Option<Hit>),
+    ) {
+        let mut number = range.start;
+        let directions = self.samples.directions_in(range, point.normal, rotation);
+        let visit = |direction, hit| {
+            number += 1;
+            visit(number, direction, hit);
+        };
+        self.scene.surfaces.closest_hits(point.position, directions, point.near, None, visit);
+    }
+
     /// Sums over the rays of `range`. They exclude the emission of lights that `direct` sends rays
     /// to, and of wide lights, for which the visible share is counted.
     fn trace<'d, const FIELDS: usize>(
@@ -149,77 +168,66 @@ impl RayGather {
         direct: &'d DirectLight,
         range: Range<u32>,
     ) -> HemisphereRays<'d, FIELDS> {
-        let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
+        let SceneRays { panes, lights, rotations, .. } = &self.scene;
         let rotation = rotations.at(point.position, point.near);
         let mut sums = HemisphereRays::none(direct.wide());
         let sky = lights.scene().sky();
-        let out = &mut sums.of_all_fields;
-        let of_wide = &mut sums.of_wide;
-        let (mut ray, rays) = (range.start, range.len());
-        let mut near = vec![];
-        let directions = self.samples.directions_in(range, point.normal, rotation);
-        surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {
+        let (rays, mut near) = (range.len(), vec![]);
+        self.cast(point, rotation, range, |ray, direction, hit| {
             let passed = |end: f64| panes.transmittance(point.position, direction, point.near..end);
-            direct.add_to_wide(of_wide, direction, hit, passed);
-            ray += 1;
+            direct.add_to_wide(&mut sums.of_wide, direction, hit, passed);
             let Some(hit) = hit else {
-                out.escaped += 1.0;
-                let radiosity = PI * sky.radiance(direction) * passed(f64::INFINITY);
-                out.irradiance += radiosity;
-                sums.largest = sums.largest.max(radiosity.length());
-                return;
+                return sums.add_escaped(PI * sky.radiance(direction) * passed(f64::INFINITY));
             };
+            let out = &mut sums.of_all_fields;
             out.inverse_distance += 1.0 / hit.distance;
             if !hit.front {
                 out.backface += 1.0;
                 return;
             }
             let passed = passed(hit.distance);
-            let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
-            if self.near_field.is_some() && NearField::is_near(fields[0].mesh, element, &hit) {
-                near.push(NearRay { hit, direction, passed, ray });
-            } else {
-                let first = fields[0].reflected_on_element(element, local);
-                let reflected = |k: usize| match k {
-                    0 => first * passed,
-                    k => fields[k].reflected_at(hit.triangle, hit.u, hit.v) * passed,
-                };
-                add(&mut sums.reflected, &mut sums.largest, std::array::from_fn(reflected));
-            }
             let light = lights.of_triangle[hit.triangle];
             if light != NO_LIGHT && !direct.samples(light) {
                 out.direct += lights.lights[light as usize].exitance * passed;
             }
-        });
-        let covered = self.near_field.as_ref();
-        let covered = covered.filter(|_| NearField::is_covered(near.len(), rays));
-        for ray in near {
-            let reflected_at =
-                |field: &RadiosityField, hit: &Hit| field.reflected_at(hit.triangle, hit.u, hit.v);
-            let reflected = if let Some(near_field) = covered {
-                let by_area = !direct.lights().is_empty();
-                let NearLight { light, end } =
-                    near_field.light(fields[0].mesh, point, rotation, &ray, by_area);
-                fields.map(|field| match &end {
-                    Some((share, end)) => light + *share * reflected_at(field, end),
-                    None => light,
-                })
+            let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
+            if self.near_field.is_some() && NearField::is_near(fields[0].mesh, element, &hit) {
+                near.push(NearRay { hit, direction, passed, ray });
             } else {
-                fields.map(|field| reflected_at(field, &ray.hit))
-            };
-            let reflected = reflected.map(|radiosity| radiosity * ray.passed);
-            add(&mut sums.reflected, &mut sums.largest, reflected);
+                let reflected = |k: usize| match k {
+                    0 => fields[0].reflected_on_element(element, local) * passed,
+                    k => fields[k].reflected_at(hit.triangle, hit.u, hit.v) * passed,
+                };
+                sums.add_reflected(std::array::from_fn(reflected));
+            }
+        });
+        let is_covered = NearField::is_covered(near.len(), rays);
+        for ray in near {
+            let path = self.near_field.as_ref().filter(|_| is_covered).map(|near_field| {
+                near_field.light(fields[0].mesh, point, rotation, &ray, !direct.lights().is_empty())
+            });
+            sums.add_reflected(reflected_near(fields, &ray, path));
         }
         sums
     }
 }
 
-/// Adds the radiosity along a ray, by field.
-fn add<const FIELDS: usize>(sums: &mut [Rgb; FIELDS], largest: &mut f64, reflected: [Rgb; FIELDS]) {
-    *largest = largest.max(reflected[0].length());
-    for (sum, reflected) in sums.iter_mut().zip(reflected) {
-        *sum += reflected;
-    }
+/// Light that a near surface reflects along a ray: by a path or, without one, by each field.
+fn reflected_near<const FIELDS: usize>(
+    fields: [&RadiosityField; FIELDS],
+    ray: &NearRay,
+    path: Option<NearLight>,
+) -> [Rgb; FIELDS] {
+    let reflected_at =
+        |field: &RadiosityField, hit: &Hit| field.reflected_at(hit.triangle, hit.u, hit.v);
+    let reflected = |field: &RadiosityField| match &path {
+        Some(NearLight { light, end: Some((share, end)) }) => {
+            *light + *share * reflected_at(field, end)
+        }
+        Some(NearLight { light, end: None }) => *light,
+        None => reflected_at(field, &ray.hit),
+    };
+    fields.map(|field| reflected(field) * ray.passed)
 }
 
 /// The power of two nearest to `count`: minimum number of rays of a point.
@@ -275,6 +283,21 @@ impl<'d, const FIELDS: usize> HemisphereRays<'d, FIELDS> {
             of_all_fields: IrradianceSample::default(),
             reflected: [Rgb::ZERO; FIELDS],
             largest: 0.0,
+        }
+    }
+
+    /// Adds a ray without a hit, by the radiosity of a surface as bright as the sky there.
+    fn add_escaped(&mut self, radiosity: Rgb) {
+        self.of_all_fields.escaped += 1.0;
+        self.of_all_fields.irradiance += radiosity;
+        self.largest = self.largest.max(radiosity.length());
+    }
+
+    /// Adds the radiosity that a surface reflects along a ray, by field.
+    fn add_reflected(&mut self, reflected: [Rgb; FIELDS]) {
+        self.largest = self.largest.max(reflected[0].length());
+        for (sum, reflected) in self.reflected.iter_mut().zip(reflected) {
+            *sum += reflected;
         }
     }
 }

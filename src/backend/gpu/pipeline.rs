@@ -11,16 +11,12 @@ pub fn shader(device: &wgpu::Device, file: &str) -> wgpu::ShaderModule {
     })
 }
 
-/// A compute pipeline of entry point `entry_point`, with the layout of the shader.
-pub fn compute(
-    device: &wgpu::Device,
-    module: &wgpu::ShaderModule,
-    entry_point: &str,
-) -> wgpu::ComputePipeline {
+/// A compute pipeline of an entry point of the shader in this `file`, with its layout.
+pub fn compute(device: &wgpu::Device, file: &str, entry_point: &str) -> wgpu::ComputePipeline {
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(entry_point),
         layout: None,
-        module,
+        module: &shader(device, file),
         entry_point: Some(entry_point),
         compilation_options: Default::default(),
         cache: None,

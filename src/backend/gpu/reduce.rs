@@ -50,14 +50,12 @@ impl Reduce {
     /// For item buffers whose item k counts for slot `slot_of_item[k]` of the row.
     pub fn new(memory: &Memory, slot_of_item: &[u32], size: BatchSize) -> Result<Self, Error> {
         let BatchSize { resolution, slots, hemicubes } = size;
-        let device = &memory.device;
         let slot_of_item = memory.storage("slots", bytemuck::cast_slice(slot_of_item))?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let row_bytes = u64::from(hemicubes) * u64::from(slots) * 4;
         // Zero initially and after each batch.
         let rows = memory.buffer("rows", row_bytes, usage | wgpu::BufferUsages::COPY_SRC)?;
-        let module = pipeline::shader(device, "reduce.wgsl");
-        let pipeline = pipeline::compute(device, &module, "reduce");
+        let pipeline = pipeline::compute(&memory.device, "reduce.wgsl", "reduce");
         let item_bytes = Reduce::items_bytes(resolution) * u64::from(hemicubes);
         let items = memory.buffer("items", item_bytes, usage)?;
         Ok(Reduce { pipeline, slot_of_item, items, rows, slots })

@@ -93,17 +93,7 @@ impl HemicubeRows {
         check_resolution_fits(limits, resolution)?;
         check_mesh_fits(limits, mesh)?;
         let slots = slots(mesh);
-        let item_bytes = Reduce::items_bytes(resolution);
-        let max_batch = match gpu.assumed_kind() {
-            // More are no faster. Plain choice; no recorded measurement.
-            AdapterKind::Cpu => 16,
-            _ => CompactedRows::MAX_BATCH,
-        };
-        // A software device draws 32 MiB of item buffers in a fraction of a second.
-        let preferred_batch = u64::from(max_batch.min(limits.layers))
-            .min(((32 << 20) / item_bytes).max(1))
-            .min(limits.buffer / item_bytes)
-            .min(limits.buffer / row_bytes(slots)) as u32;
+        let preferred_batch = preferred_batch(gpu, resolution, slots);
         let coordinates = SplitFloat::new(mesh.scene());
         let (table, draw_list) = (ItemTable::new(mesh), DrawList::new(mesh.scene()));
         let order = &draw_list.order;
@@ -224,6 +214,21 @@ impl HemicubeRows {
         *drawn += u64::from(count);
         rows.transpose().map_err(|found| gpu.invalid_result(found))
     }
+}
+
+/// Number of hemicubes in a batch where there is enough memory.
+fn preferred_batch(gpu: &Gpu, resolution: u32, slots: u32) -> u32 {
+    let (limits, item_bytes) = (gpu.limits(), Reduce::items_bytes(resolution));
+    let max_batch = match gpu.assumed_kind() {
+        // More are no faster. Plain choice; no recorded measurement.
+        AdapterKind::Cpu => 16,
+        _ => CompactedRows::MAX_BATCH,
+    };
+    // A software device draws 32 MiB of item buffers in a fraction of a second.
+    u64::from(max_batch.min(limits.layers))
+        .min(((32 << 20) / item_bytes).max(1))
+        .min(limits.buffer / item_bytes)
+        .min(limits.buffer / row_bytes(slots)) as u32
 }
 
 /// Words of a dense row over `mesh`.

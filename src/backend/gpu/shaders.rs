@@ -1,14 +1,16 @@
 //! Sources of the shaders; shared parts are in `shaders/shared`.
 
-use super::layout::constants_wgsl;
+use super::layout::{constants_wgsl, structs_wgsl, wgsl_type};
 
-/// Name and source of a shader: it begins with the shared constants and its shared parts.
+/// Name and source of a shader: it begins with the shared constants and structs, and its shared
+/// parts.
 macro_rules! shader {
     ($file:literal $(, $shared:literal)*) => {
         (
             $file,
             concat!(
                 constants_wgsl!(),
+                structs_wgsl!(),
                 $(include_str!(concat!("../../../shaders/shared/", $shared)),)*
                 include_str!(concat!("../../../shaders/", $file)),
             ),
@@ -49,6 +51,6 @@ pub const SHADERS: [(&str, &str); 9] = [
     field_shader!("near_paths.wgsl"),
     ray_shader!("light_rays.wgsl", "sky.wgsl", "gather_state.wgsl", "work_list.wgsl"),
     ray_shader!("settle.wgsl", "gather_state.wgsl", "near_field.wgsl"),
-    ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl", "row_settings.wgsl"),
-    shader!("compact_rows.wgsl", "row_settings.wgsl"),
+    ray_shader!("row_rays.wgsl", "lattice.wgsl", "element.wgsl"),
+    shader!("compact_rows.wgsl"),
 ];

@@ -1,6 +1,6 @@
 //! Buffers of a gather: those of the batches in flight.
 
-use super::layout::{GatherSettings, POINT_STATE_BYTES, Sample, TracedPoint, WORK_HEADER_BYTES};
+use super::layout::{GatherSettings, PointState, Sample, TracedPoint, WORK_HEADER_BYTES};
 use super::memory::Memory;
 use crate::error::Error;
 
@@ -53,7 +53,11 @@ impl Slots {
         let slot = |_| {
             Ok(Slot {
                 points: memory.buffer("points", room * size_of::<TracedPoint>() as u64, storage)?,
-                states: memory.buffer("states", room * POINT_STATE_BYTES, Usage::STORAGE)?,
+                states: memory.buffer(
+                    "states",
+                    room * size_of::<PointState>() as u64,
+                    Usage::STORAGE,
+                )?,
                 samples: memory.buffer(
                     "samples",
                     sample_bytes,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3};
 
 use super::device::Gpu;
 use crate::gather::GatherPoint;
@@ -388,27 +388,6 @@ pub fn random_radiosity(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<Rgb>) {
         .map(|k| Rgb::new(random(3 * k), random(3 * k + 1), random(3 * k + 2)));
     let values = values.collect();
     (corners, values)
-}
-
-/// Deviations across `direction` and of an origin that rounding may cause, and none: a ray of the
-/// device is that of the twin for one of these, or between them.
-///
-/// Directions: the tested devices compute sines and cosines to 2⁻²⁰, and all other rounding of a
-/// direction, some ten of 2⁻²⁴, is less. Origins: a triangle test rounds differences of
-/// coordinates, which are below 2 in units of the scene's size, some four times by 2⁻²⁴ of that.
-pub fn shifts() -> Vec<(Vec2, Vec3)> {
-    let steps = [-1.0, 0.0, 1.0];
-    let across = steps.iter().flat_map(|&y| steps.map(|x| Vec2::new(x, y)));
-    let across = across.filter(|a| *a != Vec2::ZERO).map(|a| (a * 2f32.powi(-20), Vec3::ZERO));
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
-    let along = axes.map(|axis| (Vec2::ZERO, axis * 2f32.powi(-21)));
-    std::iter::once((Vec2::ZERO, Vec3::ZERO)).chain(across).chain(along).collect()
-}
-
-/// `direction` turned by angles in the plane across it.
-pub fn turned_by(direction: Vec3, across: Vec2) -> Vec3 {
-    let (x, y) = direction.any_orthonormal_pair();
-    (direction + x * across.x + y * across.y).normalize()
 }
 
 /// Layer `layer` of a texture, line by line.

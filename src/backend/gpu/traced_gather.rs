@@ -25,6 +25,7 @@ use super::memory::Memory;
 use super::pipeline::bind_group;
 use super::slots::{IN_FLIGHT, Slot, Slots};
 use super::traced_scene::TracedScene;
+use super::tracing::GatherPass;
 use crate::backend::adapter::AdapterKind;
 use crate::backend::cpu::RayGather;
 use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, max_rays, min_rays, samples};
@@ -266,81 +267,69 @@ impl TracedGather {
         points: &[TracedPoint],
     ) -> wgpu::SubmissionIndex {
         let gpu = &self.gpu;
-        let Slot { points: buffer, samples, work, staging, settings, path_settings, .. } =
-            &slots.slots[slot];
+        let no_work = &slots.no_work;
+        let slot = &slots.slots[slot];
         let count = points.len() as u32;
-        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(points));
-        for (pass_rays, buffers) in [(PASS_RAYS, settings), (self.path_rays(), path_settings)] {
+        gpu.queue.write_buffer(&slot.points, 0, bytemuck::cast_slice(points));
+        gpu.queue.write_buffer(&slot.work, 0, bytemuck::cast_slice(&all_work(count)));
+        self.write_settings(slot, count);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            bound.set(&mut pass, GatherPass::RankLights, 0);
+            pass.dispatch_workgroups(count, 1, 1);
+        }
+        let doublings = (self.max_rays / self.min_rays).ilog2();
+        for round in 0..=if self.has_lights() { 2 * doublings } else { doublings } {
+            // The second half has the same number of rays as all before it: at most this.
+            let rays = self.min_rays << round.min(doublings).saturating_sub(1);
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for (of_gather, number) in self.ray_passes(rays) {
+                bound.set(&mut pass, of_gather, number);
+                pass.dispatch_workgroups_indirect(&slot.work, of_gather.list_offset());
+            }
+            drop(pass);
+            encoder.copy_buffer_to_buffer(no_work, 0, &slot.work, 0, WORK_HEADER_BYTES);
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            bound.set(&mut pass, GatherPass::Settle, 0);
+            pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+        }
+        let bytes = size_of::<Sample>() as u64 * u64::from(count);
+        encoder.copy_buffer_to_buffer(&slot.samples, 0, &slot.staging, 0, bytes);
+        gpu.queue.submit([encoder.finish()])
+    }
+
+    /// Writes the settings of all passes over `points` points.
+    fn write_settings(&self, slot: &Slot, points: u32) {
+        let of_paths = (self.path_rays(), &slot.path_settings);
+        for (pass_rays, buffers) in [(PASS_RAYS, &slot.settings), of_paths] {
             for (pass, buffer) in (0..).zip(buffers) {
                 let settings = GatherSettings {
                     min_rays: self.min_rays,
                     max_rays: self.max_rays,
                     noise: self.noise as f32,
                     dim: (self.dim / self.scene.radiance_unit) as f32,
-                    points: count,
+                    points,
                     first: pass * pass_rays,
                     pass_rays,
                     near_field: self.near_field.into(),
                 };
-                gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
+                self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&settings));
             }
         }
-        let pipelines = gpu.tracing.gather_pipelines(&gpu.device);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let has_lights = self.has_lights();
-        let passes = |rays: u32| rays.div_ceil(PASS_RAYS) as usize;
-        let path_passes = |rays: u32| match self.near_field {
-            true => rays.div_ceil(self.path_rays()) as usize,
-            false => 0,
-        };
-        let shadow_rays = |rays: u32| (rays / RAYS_PER_SHADOW_RAY).max(2);
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            bound.rank_lights.set(&mut pass, &pipelines.rank_lights, 0);
-            pass.dispatch_workgroups(count, 1, 1);
-            for k in 0..passes(self.min_rays) {
-                bound.hemisphere_rays.set(&mut pass, &pipelines.hemisphere_rays, k);
-                pass.dispatch_workgroups(count, 1, 1);
-            }
-            for k in 0..path_passes(self.min_rays) {
-                bound.near_paths.set(&mut pass, &pipelines.near_paths, k);
-                pass.dispatch_workgroups(count, 1, 1);
-            }
-            for k in 0..if has_lights { passes(shadow_rays(self.min_rays)) } else { 0 } {
-                bound.light_rays.set(&mut pass, &pipelines.light_rays, k);
-                pass.dispatch_workgroups(count, 1, 1);
-            }
-        }
-        let settle = |encoder: &mut wgpu::CommandEncoder| {
-            encoder.copy_buffer_to_buffer(&slots.no_work, 0, work, 0, WORK_HEADER_BYTES);
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            bound.settle.set(&mut pass, &pipelines.settle, 0);
-            pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
-        };
-        settle(&mut encoder);
-        let doublings = (self.max_rays / self.min_rays).ilog2();
-        for round in 0..if has_lights { 2 * doublings } else { doublings } {
-            // The second half has the same number of rays as all before it: at most this.
-            let rays = self.min_rays << round.min(doublings - 1);
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            for k in 0..passes(rays) {
-                bound.more_hemisphere_rays.set(&mut pass, &pipelines.more_hemisphere_rays, k);
-                pass.dispatch_workgroups_indirect(work, 0);
-            }
-            for k in 0..path_passes(rays) {
-                bound.more_near_paths.set(&mut pass, &pipelines.more_near_paths, k);
-                pass.dispatch_workgroups_indirect(work, 0);
-            }
-            for k in 0..if has_lights { passes(shadow_rays(rays)) } else { 0 } {
-                bound.more_light_rays.set(&mut pass, &pipelines.more_light_rays, k);
-                pass.dispatch_workgroups_indirect(work, 12);
-            }
-            drop(pass);
-            settle(&mut encoder);
-        }
-        let bytes = size_of::<Sample>() as u64 * u64::from(count);
-        encoder.copy_buffer_to_buffer(samples, 0, staging, 0, bytes);
-        gpu.queue.submit([encoder.finish()])
+    }
+
+    /// The passes that cast at most `rays` rays over the hemisphere from each point, and those to
+    /// lights: each kind with the numbers of its passes, in order.
+    fn ray_passes(&self, rays: u32) -> impl Iterator<Item = (GatherPass, usize)> {
+        let shadow_rays = (rays / RAYS_PER_SHADOW_RAY).max(2);
+        let numbers = [
+            rays.div_ceil(PASS_RAYS),
+            if self.near_field { rays.div_ceil(self.path_rays()) } else { 0 },
+            if self.has_lights() { shadow_rays.div_ceil(PASS_RAYS) } else { 0 },
+        ];
+        let passes = GatherPass::RAYS.into_iter().zip(numbers);
+        passes.flat_map(|(pass, count)| (0..count as usize).map(move |number| (pass, number)))
     }
 
     /// Number of rays of a point in one pass that follows paths.
@@ -374,103 +363,105 @@ impl TracedGather {
         Ok(())
     }
 
-    /// Bind groups of a slot for all passes.
+    /// All passes over one slot, with their bindings.
     fn bind(&self, slot: &Slot, field: &FieldBuffers) -> Bound {
-        let (device, scene) = (&self.gpu.device, &*self.scene);
-        let pipelines = self.gpu.tracing.gather_pipelines(device);
-        let Slot { points, states, samples, work, settings, path_settings, .. } = slot;
-        let view = wgpu::BindingResource::TextureView;
+        let pipelines = self.gpu.tracing.gather_pipelines(&self.gpu.device).iter();
+        let passes = GatherPass::ALL.into_iter().zip(pipelines);
+        Bound(passes.map(|((pass, _), p)| self.bind_pass(pass, p.clone(), slot, field)).collect())
+    }
+
+    fn bind_pass(
+        &self,
+        pass: GatherPass,
+        pipeline: wgpu::ComputePipeline,
+        slot: &Slot,
+        field: &FieldBuffers,
+    ) -> BoundPass {
+        let group = |number: u32, entries: &[(u32, wgpu::BindingResource)]| {
+            let layout = pipeline.get_bind_group_layout(number);
+            bind_group(&self.gpu.device, "gather", &layout, entries)
+        };
+        let mut groups = vec![(0, group(0, &self.scene_bindings(pass)))];
+        if pass.reads_field() {
+            let elements = wgpu::BindingResource::TextureView(&field.elements);
+            let field = [(0, field.quadtrees.as_entire_binding()), (1, elements)];
+            groups.push((2, group(2, &field)));
+        }
+        let settings = match pass {
+            GatherPass::NearPaths => &slot.path_settings,
+            _ => &slot.settings,
+        };
+        let batch = self.batch_bindings(pass, slot);
+        let batches = settings
+            .iter()
+            .map(|settings| group(1, &[&batch[..], &[(3, settings.as_entire_binding())]].concat()))
+            .collect();
+        BoundPass { pipeline, groups, batches }
+    }
+
+    /// Bindings of group 0.
+    fn scene_bindings(&self, pass: GatherPass) -> Vec<(u32, wgpu::BindingResource<'_>)> {
+        use GatherPass::*;
+        let scene = &self.scene;
         let geometry = scene.geometry();
-        let without_nodes = geometry[1..].to_vec();
         let lights = [(5, scene.lights.as_entire_binding()), (6, scene.lamps.as_entire_binding())];
-        let sky = [(7, view(&scene.sky))];
-        let light_field =
-            vec![(0, field.quadtrees.as_entire_binding()), (1, view(&field.elements))];
-        let point = [(0, points.as_entire_binding()), (1, states.as_entire_binding())];
-        let directions = [(2, view(&self.directions))];
-        let work_list = [(4, work.as_entire_binding())];
-        let bind_to = |settings: &[wgpu::Buffer],
-                       pipeline: &wgpu::ComputePipeline,
-                       fixed: Vec<(u32, Vec<(u32, wgpu::BindingResource)>)>,
-                       batch: Vec<(u32, wgpu::BindingResource)>| {
-            let groups = fixed.into_iter().map(|(group, entries)| {
-                let layout = pipeline.get_bind_group_layout(group);
-                (group, bind_group(device, "scene", &layout, &entries))
-            });
-            let layout = pipeline.get_bind_group_layout(1);
-            let batches = settings.iter().map(|settings| {
-                let mut entries = batch.clone();
-                entries.push((3, settings.as_entire_binding()));
-                bind_group(device, "batch", &layout, &entries)
-            });
-            BoundPass { groups: groups.collect(), batches: batches.collect() }
-        };
-        fn all<'a>(
-            parts: &[&[(u32, wgpu::BindingResource<'a>)]],
-        ) -> Vec<(u32, wgpu::BindingResource<'a>)> {
-            parts.concat()
+        match pass {
+            RankLights => [&geometry[1..], &lights].concat(),
+            LightRays => [&geometry[..], &lights].concat(),
+            Settle => [&geometry[2..3], &lights[..1]].concat(),
+            HemisphereRays | NearPaths => {
+                let sky = [(7, wgpu::BindingResource::TextureView(&scene.sky))];
+                [&geometry[..], &lights, &sky].concat()
+            }
         }
-        let bind = |pipeline, fixed, batch| bind_to(settings, pipeline, fixed, batch);
-        let rays = |settings, pipeline, batch| {
-            let scene = all(&[&geometry, &lights, &sky]);
-            bind_to(settings, pipeline, vec![(0, scene), (2, light_field.clone())], batch)
-        };
-        let of_all = all(&[&point, &directions]);
-        let of_listed = all(&[&point, &directions, &work_list]);
-        let to_lights =
-            |pipeline, batch| bind(pipeline, vec![(0, all(&[&geometry, &lights]))], batch);
-        Bound {
-            rank_lights: bind(
-                &pipelines.rank_lights,
-                vec![(0, all(&[&without_nodes, &lights]))],
-                point.to_vec(),
-            ),
-            hemisphere_rays: rays(settings, &pipelines.hemisphere_rays, of_all.clone()),
-            more_hemisphere_rays: rays(
-                settings,
-                &pipelines.more_hemisphere_rays,
-                of_listed.clone(),
-            ),
-            near_paths: rays(path_settings, &pipelines.near_paths, of_all),
-            more_near_paths: rays(path_settings, &pipelines.more_near_paths, of_listed),
-            light_rays: to_lights(&pipelines.light_rays, point.to_vec()),
-            more_light_rays: to_lights(&pipelines.more_light_rays, all(&[&point, &work_list])),
-            settle: bind(
-                &pipelines.settle,
-                vec![(0, vec![geometry[2].clone(), lights[0].clone()])],
-                all(&[&point, &[(2, samples.as_entire_binding())], &work_list]),
-            ),
+    }
+
+    /// Bindings of group 1 without the settings.
+    fn batch_bindings<'a>(
+        &'a self,
+        pass: GatherPass,
+        slot: &'a Slot,
+    ) -> Vec<(u32, wgpu::BindingResource<'a>)> {
+        let mut bindings =
+            vec![(0, slot.points.as_entire_binding()), (1, slot.states.as_entire_binding())];
+        if pass.reads_field() {
+            bindings.push((2, wgpu::BindingResource::TextureView(&self.directions)));
         }
+        if pass == GatherPass::Settle {
+            bindings.push((2, slot.samples.as_entire_binding()));
+        }
+        if pass != GatherPass::RankLights {
+            bindings.push((4, slot.work.as_entire_binding()));
+        }
+        bindings
     }
 }
 
-/// Bind groups of all passes over one slot.
-struct Bound {
-    rank_lights: BoundPass,
-    hemisphere_rays: BoundPass,
-    more_hemisphere_rays: BoundPass,
-    near_paths: BoundPass,
-    more_near_paths: BoundPass,
-    light_rays: BoundPass,
-    more_light_rays: BoundPass,
-    settle: BoundPass,
-}
+/// All passes over one slot, in the order of [`GatherPass::ALL`].
+struct Bound(Vec<BoundPass>);
 
 struct BoundPass {
+    pipeline: wgpu::ComputePipeline,
     groups: Vec<(u32, wgpu::BindGroup)>,
     /// Group 1, one per preceding pass that cast rays of the same half.
     batches: Vec<wgpu::BindGroup>,
 }
 
-impl BoundPass {
-    /// Prepares `pass` for a dispatch.
-    fn set(&self, pass: &mut wgpu::ComputePass, pipeline: &wgpu::ComputePipeline, number: usize) {
+impl Bound {
+    /// Prepares `pass` for a dispatch of a gather's pass, the given `number` of its kind.
+    fn set(&self, pass: &mut wgpu::ComputePass, of_gather: GatherPass, number: usize) {
+        let BoundPass { pipeline, groups, batches } = &self.0[of_gather as usize];
         pass.set_pipeline(pipeline);
-        for (group, bindings) in &self.groups {
+        for (group, bindings) in groups {
             pass.set_bind_group(*group, bindings, &[]);
         }
-        pass.set_bind_group(1, &self.batches[number], &[]);
+        pass.set_bind_group(1, &batches[number], &[]);
     }
+}
+
+/// `Work` with all of `count` points in both lists.
+fn all_work(count: u32) -> Vec<u32> {
+    [count, 1, 1, count, 1, 1, 0, 0].into_iter().chain(0..count).chain(0..count).collect()
 }
 
 /// Checks that a device supports the width of textures that are read as arrays.
@@ -483,12 +474,16 @@ pub fn check_textures(texture: u32) -> Result<(), Error> {
     Err(Error::new(ErrorKind::Setting, "graphics device", found, remedy))
 }
 
-/// The directions of `samples`, ray by ray. Those that are cast together (the first half of
+/// The directions of `samples`, ray by ray, as texels: along two tangents and the normal.
+pub fn local_directions(samples: &HemisphereSamples) -> Vec<[f32; 4]> {
+    samples.local().iter().map(|&[x, y, z]| [x as f32, y as f32, z as f32, 0.0]).collect()
+}
+
+/// The same, ordered. Those that are cast together (the first half of
 /// `min_rays`, the second, then each doubling) are in the order of a Z-curve over azimuth and
 /// elevation, so that neighbouring lanes have similar hits.
 fn ordered_directions(samples: &HemisphereSamples, min_rays: u32) -> Vec<[f32; 4]> {
-    let mut directions: Vec<[f32; 4]> =
-        samples.local().iter().map(|&[x, y, z]| [x as f32, y as f32, z as f32, 0.0]).collect();
+    let mut directions = local_directions(samples);
     let mut start = 0;
     let mut end = (min_rays / 2).max(1) as usize;
     while start < directions.len() {

@@ -17,7 +17,7 @@ use super::field::quadtrees;
 use super::layout::{BACK, FIRST_FRONT, OPEN, RowEntry, RowSettings, TracedPatch};
 use super::memory::Memory;
 use super::pipeline::bind_group;
-use super::traced_gather::check_textures;
+use super::traced_gather::{check_textures, local_directions};
 use super::traced_scene::TracedScene;
 use crate::backend::cpu::rows::{self as cpu, rays_for_importance, rotation, row_of_counts};
 use crate::error::{Error, ErrorKind};
@@ -104,9 +104,7 @@ impl TracedRows {
     }
 
     fn add_directions(&mut self, samples: &HemisphereSamples, count: u32) -> Result<usize, Error> {
-        let local = |&[x, y, z]: &[f64; 3]| [x as f32, y as f32, z as f32, 0.0];
-        let directions: Vec<[f32; 4]> = samples.local().iter().map(local).collect();
-        let memory = &self.buffers.memory;
+        let (directions, memory) = (local_directions(samples), &self.buffers.memory);
         let view = self.gpu.with_error_scopes(|| memory.lines("directions", &directions))?;
         self.directions.push((count, view));
         Ok(self.directions.len() - 1)

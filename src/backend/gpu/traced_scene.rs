@@ -113,30 +113,22 @@ impl TracedArrays {
         };
         let has_holes = arrays.add_masks(scene);
         arrays.add_nodes(&rays, 0);
-        let triangle = |t: usize, light: u32| arrays.coordinates.traced(scene, t, light);
-        let with_holes = |mut triangle: TracedTriangle| {
-            if has_holes.get(triangle.index as usize) == Some(&true) {
-                triangle.flags |= HAS_HOLES;
-            }
-            triangle
-        };
-        let mut triangles: Vec<TracedTriangle> =
-            rays.triangles().map(|t| with_holes(triangle(t, lights.of_triangle[t]))).collect();
-        let blocking = triangles.len();
+        arrays.add_triangles(scene, rays.triangles().map(|t| (t, lights.of_triangle[t])));
+        let blocking = arrays.triangles.len();
         if let Some((hierarchy, transmittance)) = panes.hierarchy() {
             let clear: Vec<usize> =
                 (0..scene.triangles().len()).filter(|&t| scene.is_clear(t)).collect();
-            let first_row = lights.lights.len();
-            triangles.extend(
-                hierarchy
-                    .triangles()
-                    .map(|k| with_holes(triangle(clear[k], (first_row + k) as u32))),
-            );
+            let row = |k: usize| (clear[k], (lights.lights.len() + k) as u32);
+            arrays.add_triangles(scene, hierarchy.triangles().map(row));
             arrays.lights = transmittance.iter().map(share_row).collect();
             arrays.info.panes = arrays.nodes.len() as u32;
             arrays.add_nodes(hierarchy, blocking);
         }
-        arrays.triangles = triangles;
+        for triangle in &mut arrays.triangles {
+            if has_holes.get(triangle.index as usize) == Some(&true) {
+                triangle.flags |= HAS_HOLES;
+            }
+        }
         arrays.add_translucent(scene, lights.lights.len(), blocking);
         arrays.add_lights(lights, blocking);
         arrays.add_light_from_outside(scene);
@@ -146,6 +138,12 @@ impl TracedArrays {
         lights.resize(lights.len().max(1), Zeroable::zeroed());
         lamps.resize(lamps.len().max(1), Zeroable::zeroed());
         arrays
+    }
+
+    /// Adds triangles of `scene` by their indices, each with the row of its light.
+    fn add_triangles(&mut self, scene: &Scene, triangles: impl Iterator<Item = (usize, u32)>) {
+        let coordinates = &self.coordinates;
+        self.triangles.extend(triangles.map(|(t, light)| coordinates.traced(scene, t, light)));
     }
 
     /// The nodes of a hierarchy whose triangles begin at `first_triangle`.

@@ -31,70 +31,55 @@ struct KeptField {
     buffers: Arc<FieldBuffers>,
 }
 
-/// The passes of a gather.
-#[derive(Debug)]
-pub struct GatherPipelines {
-    pub rank_lights: wgpu::ComputePipeline,
-    pub hemisphere_rays: wgpu::ComputePipeline,
-    pub more_hemisphere_rays: wgpu::ComputePipeline,
-    pub near_paths: wgpu::ComputePipeline,
-    pub more_near_paths: wgpu::ComputePipeline,
-    pub light_rays: wgpu::ComputePipeline,
-    pub more_light_rays: wgpu::ComputePipeline,
-    pub settle: wgpu::ComputePipeline,
+/// A pass of a gather.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GatherPass {
+    RankLights,
+    HemisphereRays,
+    NearPaths,
+    LightRays,
+    Settle,
 }
 
-impl GatherPipelines {
-    fn new(device: &wgpu::Device) -> GatherPipelines {
-        let files = [
-            "rank_lights.wgsl",
-            "hemisphere_rays.wgsl",
-            "near_paths.wgsl",
-            "light_rays.wgsl",
-            "settle.wgsl",
-        ];
-        let [rank, hemisphere, near, lights, settle] =
-            files.map(|file| pipeline::shader(device, file));
-        // Drivers take up to a second for one, on one core.
-        let entries = [
-            (&rank, "rank_lights"),
-            (&hemisphere, "hemisphere_rays"),
-            (&hemisphere, "more_hemisphere_rays"),
-            (&near, "near_paths"),
-            (&near, "more_near_paths"),
-            (&lights, "light_rays"),
-            (&lights, "more_light_rays"),
-            (&settle, "settle"),
-        ];
-        // Not in the thread pool: one of its threads may be waiting for them.
-        let compiled = std::thread::scope(|scope| {
-            entries
-                .map(|(module, entry_point)| {
-                    scope.spawn(move || pipeline::compute(device, module, entry_point))
-                })
-                .map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
-        });
-        let [
-            rank_lights,
-            hemisphere_rays,
-            more_hemisphere_rays,
-            near_paths,
-            more_near_paths,
-            light_rays,
-            more_light_rays,
-            settle,
-        ] = compiled;
-        GatherPipelines {
-            rank_lights,
-            hemisphere_rays,
-            more_hemisphere_rays,
-            near_paths,
-            more_near_paths,
-            light_rays,
-            more_light_rays,
-            settle,
-        }
+impl GatherPass {
+    /// All passes, with the entry point of each, which has the name of its file.
+    pub const ALL: [(GatherPass, &str); 5] = [
+        (GatherPass::RankLights, "rank_lights"),
+        (GatherPass::HemisphereRays, "hemisphere_rays"),
+        (GatherPass::NearPaths, "near_paths"),
+        (GatherPass::LightRays, "light_rays"),
+        (GatherPass::Settle, "settle"),
+    ];
+
+    /// The passes that cast rays from the points of a work list, in the order in which they run.
+    pub const RAYS: [GatherPass; 3] =
+        [GatherPass::HemisphereRays, GatherPass::NearPaths, GatherPass::LightRays];
+
+    /// Whether its rays look light up in a field.
+    pub fn reads_field(self) -> bool {
+        matches!(self, GatherPass::HemisphereRays | GatherPass::NearPaths)
     }
+
+    /// Offset in `Work` of the number of workgroups, one per point of the pass's list, bytes.
+    pub fn list_offset(self) -> u64 {
+        if self == GatherPass::LightRays { 12 } else { 0 }
+    }
+}
+
+/// The pipelines of [`GatherPass::ALL`].
+pub type GatherPipelines = [wgpu::ComputePipeline; 5];
+
+fn gather_pipelines(device: &wgpu::Device) -> GatherPipelines {
+    // Drivers take up to a second for one, on one core. Not in the thread pool: one of its threads
+    // may be waiting for them.
+    std::thread::scope(|scope| {
+        let compile = |(_, entry_point)| {
+            let file = format!("{entry_point}.wgsl");
+            scope.spawn(move || pipeline::compute(device, &file, entry_point))
+        };
+        let threads = GatherPass::ALL.map(compile);
+        threads.map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    })
 }
 
 /// The passes of rows.
@@ -107,16 +92,11 @@ pub struct RowPipelines {
 
 impl RowPipelines {
     fn new(device: &wgpu::Device) -> RowPipelines {
-        let rays = pipeline::shader(device, "row_rays.wgsl");
-        let compact = pipeline::shader(device, "compact_rows.wgsl");
+        let compact = |entry_point| pipeline::compute(device, "compact_rows.wgsl", entry_point);
         RowPipelines {
-            row_rays: pipeline::compute(device, &rays, "row_rays"),
-            compact_rows: pipeline::compute(device, &compact, "compact_rows"),
-            compact_rows_through_panes: pipeline::compute(
-                device,
-                &compact,
-                "compact_rows_through_panes",
-            ),
+            row_rays: pipeline::compute(device, "row_rays.wgsl", "row_rays"),
+            compact_rows: compact("compact_rows"),
+            compact_rows_through_panes: compact("compact_rows_through_panes"),
         }
     }
 }
@@ -129,7 +109,7 @@ impl Tracing {
 
     /// The passes of a gather: compiled at the first call.
     pub fn gather_pipelines(&self, device: &wgpu::Device) -> &GatherPipelines {
-        self.gather.get_or_init(|| GatherPipelines::new(device))
+        self.gather.get_or_init(|| gather_pipelines(device))
     }
 
     /// `scene` on the device: the result of `upload` unless it is the previous one.

@@ -65,55 +65,67 @@ impl Snapping {
     /// side or another point, if these are near.
     fn snapped(&mut self, point: DVec2) -> LatticePoint {
         let weights = [1.0 - point.x - point.y, point.x, point.y].map(|w| w.clamp(0.0, 1.0));
-        let point = |w: [f64; 3]| (0..3).map(|k| w[k] * self.corners[k]).sum::<DVec3>();
-        let corner = (0..3).find(|&k| point(weights).distance(self.corners[k]) < self.distance);
+        let position = self.position(weights);
+        let corner = (0..3).find(|&k| position.distance(self.corners[k]) < self.distance);
         if let Some(k) = corner {
             return [[0, 0], [STEPS, 0], [0, STEPS]][k];
         }
+        let lattice = self.on_lattice(weights);
+        let [u, v] = lattice.map(|k| f64::from(k) / f64::from(STEPS));
+        let position = self.position([1.0 - u - v, u, v]);
+        let cell = (position / self.distance).floor().as_i64vec3().to_array();
+        let known = self.known_near(cell, position, lattice);
+        known.unwrap_or_else(|| {
+            self.known.entry(cell).or_default().push((position, lattice));
+            lattice
+        })
+    }
+
+    fn position(&self, weights: [f64; 3]) -> DVec3 {
+        (0..3).map(|k| weights[k] * self.corners[k]).sum()
+    }
+
+    /// The lattice point nearest to the point of these weights: on a side, if one is near.
+    fn on_lattice(&self, [a, b, c]: [f64; 3]) -> LatticePoint {
         let steps = |w: f64| ((w * f64::from(STEPS)).round() as u32).min(STEPS);
-        let near_side =
-            (0..3).filter(|&k| weights[k] * self.heights[k] < self.distance).min_by(|&k, &l| {
-                (weights[k] * self.heights[k]).total_cmp(&(weights[l] * self.heights[l]))
-            });
-        let lattice = match near_side {
+        let height = [a * self.heights[0], b * self.heights[1], c * self.heights[2]];
+        let near_side = (0..3)
+            .filter(|&k| height[k] < self.distance)
+            .min_by(|&k, &l| height[k].total_cmp(&height[l]));
+        match near_side {
             Some(0) => {
-                let v = steps(weights[2] / (weights[1] + weights[2]));
+                let v = steps(c / (b + c));
                 [STEPS - v, v]
             }
-            Some(1) => [0, steps(weights[2] / (weights[0] + weights[2]))],
-            Some(_) => [steps(weights[1] / (weights[0] + weights[1])), 0],
+            Some(1) => [0, steps(c / (a + c))],
+            Some(_) => [steps(b / (a + b)), 0],
             None => {
-                let u = steps(weights[1]);
-                [u, steps(weights[2]).min(STEPS - u)]
-            }
-        };
-        let [u, v] = lattice.map(|k| f64::from(k) / f64::from(STEPS));
-        let position = point([1.0 - u - v, u, v]);
-        let cell = (position / self.distance).floor().as_i64vec3().to_array();
-        for dx in -1..=1 {
-            for dy in -1..=1 {
-                for dz in -1..=1 {
-                    let [x, y, z] = cell;
-                    // At an element size of 0 cells are at the end of their range.
-                    let beside =
-                        [(x, dx), (y, dy), (z, dz)].map(|(k, d): (i64, i64)| k.saturating_add(d));
-                    let same_sides = |other: LatticePoint| {
-                        // A point on a side stays on it.
-                        let (a, b) = (sides_of(lattice), sides_of(other));
-                        (0..3).all(|k| !a[k] || b[k])
-                    };
-                    let near = self.known.get(&beside).into_iter().flatten();
-                    let mut near = near.filter(|(p, other)| {
-                        p.distance(position) < self.distance && same_sides(*other)
-                    });
-                    if let Some(&(_, known)) = near.next() {
-                        return known;
-                    }
-                }
+                let u = steps(b);
+                [u, steps(c).min(STEPS - u)]
             }
         }
-        self.known.entry(cell).or_default().push((position, lattice));
-        lattice
+    }
+
+    /// A point known already that is near a `position` in this `cell` of the grid. A point on a
+    /// side stays on it.
+    fn known_near(
+        &self,
+        cell: [i64; 3],
+        position: DVec3,
+        lattice: LatticePoint,
+    ) -> Option<LatticePoint> {
+        let sides = sides_of(lattice);
+        let same_sides = |other| (0..3).all(|k| !sides[k] || sides_of(other)[k]);
+        let steps = || -1..=1;
+        let beside =
+            steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+        // At an element size of 0 cells are at the end of their range.
+        let cells = beside.map(|d: [i64; 3]| [0, 1, 2].map(|k| cell[k].saturating_add(d[k])));
+        let mut points = cells.flat_map(|cell| self.known.get(&cell).into_iter().flatten());
+        let is_near = |(p, other): &&(DVec3, LatticePoint)| {
+            p.distance(position) < self.distance && same_sides(*other)
+        };
+        points.find(is_near).map(|&(_, known)| known)
     }
 }
 

@@ -16,6 +16,8 @@ use crate::scene::Piece;
 /// are unchanged, and near-equal intersections of segments merge.
 const ROUNDING: f64 = 4.0 * STEPS as f64;
 
+type Delaunay = ConstrainedDelaunayTriangulation<Point2<f64>>;
+
 /// A triangle to be cut.
 pub(super) struct CutTriangle {
     pub corners: [DVec3; 3],
@@ -33,15 +35,21 @@ impl CutTriangle {
         pieces.unwrap_or_else(|| vec![Piece::whole(self.corners)])
     }
 
-    fn triangulated(&self, cuts: &Cuts) -> Option<Vec<Piece>> {
+    /// The factor of the first weight that makes angles about right: a power of two, which keeps
+    /// points on a side exactly on it.
+    fn stretch(&self) -> f64 {
         let [a, b, c] = self.corners;
-        // A power of two keeps points on a side exactly on it, and angles about right.
-        let stretch = (b.distance(a) / c.distance(a)).log2().round().exp2();
+        (b.distance(a) / c.distance(a)).log2().round().exp2()
+    }
+
+    /// The triangulation of the cuts by stretched weights.
+    fn constrained(&self, cuts: &Cuts) -> Option<Delaunay> {
+        let stretch = self.stretch();
         let position = |[u, v]: LatticePoint| {
             let [u, v] = [u, v].map(|k| f64::from(k) / f64::from(STEPS));
             Point2::new(u * stretch, v)
         };
-        let mut triangulation = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+        let mut triangulation = Delaunay::new();
         for k in 0..3 {
             let mut steps = vec![0, STEPS];
             steps.extend(&cuts.on_sides[k]);
@@ -58,6 +66,13 @@ impl CutTriangle {
             let to = triangulation.insert(position(to)).ok()?;
             triangulation.add_constraint_and_split(from, to, |point| point);
         }
+        Some(triangulation)
+    }
+
+    fn triangulated(&self, cuts: &Cuts) -> Option<Vec<Piece>> {
+        let [a, b, c] = self.corners;
+        let stretch = self.stretch();
+        let mut triangulation = self.constrained(cuts)?;
         // In these coordinates the whole triangle has half the stretch as area.
         let area = 0.5 * (b - a).cross(c - a).length();
         let min_area = 0.1 * self.finest.powi(2) / area * stretch / 2.0;
@@ -78,11 +93,8 @@ impl CutTriangle {
             // The rounding of where segments cross.
             (q - p).perp_dot(r - p) < 1e-10
         };
-        let pieces = triangulation.inner_faces().filter_map(|face| {
-            let edges = face.adjacent_edges();
-            if is_sliver(edges) {
-                return None;
-            }
+        let faces = triangulation.inner_faces().map(|face| face.adjacent_edges());
+        let piece = |edges: [DirectedEdgeHandle<'_, _, _, _, _>; 3]| {
             let weights = edges.map(weights_of);
             let cut = [0, 1, 2].map(|k| {
                 let other = edges[k].rev().face().as_inner();
@@ -90,9 +102,9 @@ impl CutTriangle {
                     || other.is_some_and(|other| is_sliver(other.adjacent_edges()));
                 is_cut && !is_on_side([weights[k], weights[(k + 1) % 3]])
             });
-            Some(Piece { corners: weights.map(|w| self.position(w)), weights, cut })
-        });
-        Some(pieces.collect())
+            Piece { corners: weights.map(|w| self.position(w)), weights, cut }
+        };
+        Some(faces.filter(|&edges| !is_sliver(edges)).map(piece).collect())
     }
 
     /// The position with these weights of the second and third corner: on a side bit for bit the

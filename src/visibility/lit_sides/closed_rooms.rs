@@ -2,10 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
-use super::sheets::{is_at_one_edge, triangles_at_edges};
 use crate::geometry::aabb::Aabb;
 use crate::geometry::union_find::UnionFind;
-use crate::scene::Scene;
+use crate::scene::{HalfEdge, Scene};
 
 /// Per triangle of `scene`, whether it belongs to a surface that is closed, consistently wound with
 /// its fronts inwards, and as large as the scene. Light from outside does not matter in there: the
@@ -13,12 +12,10 @@ use crate::scene::Scene;
 pub fn closed_rooms(scene: &Scene) -> Vec<bool> {
     let count = scene.triangles().len();
     let (mut surfaces, mut is_open) = (UnionFind::new(count), vec![false; count]);
-    for triangles in triangles_at_edges(scene).chunk_by(is_at_one_edge) {
-        match triangles {
-            &[(_, t, forward), (_, s, also_forward)] if forward != also_forward => {
-                surfaces.join(t, s);
-            }
-            others => others.iter().for_each(|&(_, t, _)| is_open[t] = true),
+    for sharing in scene.half_edges().chunk_by(HalfEdge::has_ends_of) {
+        match sharing {
+            [a, b] if a.reversed != b.reversed => surfaces.join(a.triangle, b.triangle),
+            others => others.iter().for_each(|edge| is_open[edge.triangle] = true),
         }
     }
     let mut of_surfaces: FxHashMap<usize, Surface> = FxHashMap::default();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::geometry::union_find::UnionFind;
 use crate::sampling::hash::split_mix64;
-use crate::scene::Scene;
+use crate::scene::{HalfEdge, Scene};
 
 /// A side of a triangle: twice its index, plus one for its back.
 pub type SideIndex = usize;
@@ -116,34 +116,16 @@ impl Samples {
 fn first_sides(scene: &Scene) -> Vec<SideIndex> {
     let count = scene.triangles().len();
     let mut sheets = UnionFind::new(2 * count);
-    for triangles in triangles_at_edges(scene).chunk_by(is_at_one_edge) {
-        let &[(_, t, forward), (_, s, also_forward)] = triangles else { continue };
+    for sharing in scene.half_edges().chunk_by(HalfEdge::has_ends_of) {
+        let [a, b] = sharing else { continue };
+        let (t, s) = (a.triangle, b.triangle);
         if scene.triangles()[t].group == scene.triangles()[s].group {
             // With consistent winding, the triangles run along the shared edge in opposite
             // directions.
-            let across = usize::from(forward == also_forward);
+            let across = usize::from(a.reversed == b.reversed);
             sheets.join(2 * t, 2 * s + across);
             sheets.join(2 * t + 1, 2 * s + 1 - across);
         }
     }
     (0..2 * count).map(|side| sheets.find(side)).collect()
-}
-
-/// A triangle at an edge of its scene: the welded positions at the ends, lower first, the triangle,
-/// and whether it runs along the edge from the lower to the higher.
-pub type TriangleAtEdge = ([u32; 2], usize, bool);
-
-/// All edges of the triangles of `scene`, sorted by edge.
-pub fn triangles_at_edges(scene: &Scene) -> Vec<TriangleAtEdge> {
-    let at_edges = |(t, [a, b, c]): (usize, [u32; 3])| {
-        [(a, b), (b, c), (c, a)].map(|(a, b)| ([a.min(b), a.max(b)], t, a < b))
-    };
-    let corners = scene.welded_corners().0;
-    let mut all: Vec<TriangleAtEdge> = corners.into_iter().enumerate().flat_map(at_edges).collect();
-    all.par_sort_unstable();
-    all
-}
-
-pub fn is_at_one_edge(first: &TriangleAtEdge, second: &TriangleAtEdge) -> bool {
-    first.0 == second.0
 }

@@ -1,6 +1,5 @@
 //! Random walks from sides of triangles to the light.
 
-use std::cell::Cell;
 use std::f64::consts::PI;
 use std::iter::{once, repeat_with};
 use std::sync::Arc;
@@ -174,16 +173,16 @@ impl<'a> Walks<'a> {
     pub fn front_before(&self, at: DVec3, side: SideIndex) -> Option<usize> {
         let (t, normal) = (side / 2, self.normal(side));
         let reach = (FILE_TOLERANCE * self.scene.area(t).sqrt()).max(self.contact);
-        let covering = Cell::new(None);
+        let mut covering = None;
         self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
             let alike = self.normals[hit.triangle].dot(normal) > 0.999;
             let counts = hit.front && hit.triangle != t && alike;
             if counts {
-                covering.set(Some(hit.triangle));
+                covering = Some(hit.triangle);
             }
             counts
         });
-        covering.get()
+        covering
     }
 
     /// Unit normal on a side.

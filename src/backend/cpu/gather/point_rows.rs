@@ -2,16 +2,18 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::RayGather;
 use super::direct_light::DirectLight;
 use super::near_field::{NearField, NearLight, NearRay};
 use super::scene_rays::{RAYS_PER_SHADOW_RAY, SceneRays};
 use crate::gather::GatherPoint;
-use crate::gather::lights::NO_LIGHT;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
 use crate::gather::visible::Visible;
 use crate::mesh::Mesh;
 use crate::scene::Rgb;
+use crate::visibility::ray_scene::Hit;
 
 impl PointRows for RayGather {
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow> {
@@ -68,29 +70,23 @@ impl RayGather {
         direct: Option<&DirectLight>,
         range: Range<u32>,
     ) -> PointRow {
-        let SceneRays { surfaces, panes, lights, rotations } = &self.scene;
+        let SceneRays { lights, rotations, .. } = &self.scene;
         let rotation = rotations.at(point.position, point.near);
-        let share = 1.0 / f64::from(range.end - range.start);
-        let mut row = PointRow { share, ..PointRow::default() };
-        row.hits.reserve_exact((range.end - range.start) as usize);
+        let share = 1.0 / range.len() as f64;
+        let mut row =
+            PointRow { share, hits: Vec::with_capacity(range.len()), ..Default::default() };
         // Emission on the way is in no row: rows with lights leave near surfaces as they are.
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
-        let (mut ray, mut near) = (range.start, vec![]);
-        let wide = direct.map_or(&[][..], DirectLight::wide);
+        let (mut near, wide) = (vec![], direct.map_or(&[][..], DirectLight::wide));
         let has_entry = |light: u32| direct.is_some_and(|direct| direct.samples(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
-        let directions = self.samples.directions_in(range.clone(), point.normal, rotation);
-        surfaces.closest_hits(point.position, directions, point.near, None, |direction, hit| {
-            let passed = |end: f64| {
-                let reach = point.near..end;
-                mean(panes.transmittance(point.position, direction, reach))
-            };
+        self.cast(point, rotation, range.clone(), |ray, direction, hit| {
+            let passed = |end: f64| self.passed_evenly(point, direction, end);
             if let Some(direct) = direct {
-                direct.add_to_wide(&mut of_wide, direction, hit, |end| Rgb::splat(passed(end)));
+                direct.add_to_wide(&mut of_wide, direction, hit, passed);
             }
-            ray += 1;
             let Some(hit) = hit else {
-                row.sky += share * passed(f64::INFINITY);
+                row.sky += share * passed(f64::INFINITY).x;
                 return;
             };
             row.inverse_distance += share / hit.distance;
@@ -98,30 +94,17 @@ impl RayGather {
                 row.backface += share;
                 return;
             }
-            let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
-            let light = lights.of_triangle[hit.triangle];
-            let passed = Rgb::splat(passed(hit.distance));
+            let (passed, light) = (passed(hit.distance), lights.of_triangle[hit.triangle]);
             if near_field.is_some() && NearField::is_near_at(source, &hit) {
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
-            row.hits.push(SurfaceHit {
-                element: element as u32,
-                barycentric,
-                passed,
-                emits: light == NO_LIGHT || !has_entry(light),
-            });
+            row.hits.push(surface_hit(mesh, &hit, passed, !has_entry(light)));
         });
-        if let Some(near_field) = near_field
-            && NearField::is_covered(near.len(), range.len())
-        {
+        let is_covered = NearField::is_covered(near.len(), range.len());
+        if let Some(near_field) = near_field.filter(|_| is_covered) {
             for (k, ray) in near {
-                let NearLight { end, .. } = near_field.light(source, point, rotation, &ray, false);
-                let hit = &mut row.hits[k];
-                hit.passed *= end.map_or(Rgb::ZERO, |(share, _)| share);
-                if let Some((_, end)) = end {
-                    let (element, barycentric) = mesh.element_at(end.triangle, end.u, end.v);
-                    (hit.element, hit.barycentric) = (element as u32, barycentric);
-                }
+                let path = near_field.light(source, point, rotation, &ray, false);
+                move_to_end(&mut row.hits[k], mesh, &path);
             }
         }
         for (wide, visible) in wide.iter().zip(&of_wide) {
@@ -130,11 +113,31 @@ impl RayGather {
         row
     }
 
+    /// Transmittance of panes on a ray from `point` up to a distance, the same for all channels.
+    fn passed_evenly(&self, point: &GatherPoint, direction: DVec3, end: f64) -> Rgb {
+        let reach = point.near..end;
+        Rgb::splat(mean(self.scene.panes.transmittance(point.position, direction, reach)))
+    }
+
     fn material_of(&self, light: u32) -> u32 {
         let lights = &self.scene.lights;
         let first = lights.lights[light as usize].triangles[0];
         lights.scene().triangles()[first as usize].material
     }
+}
+
+/// Moves a hit of a near surface to the end of its path, on the elements of `mesh`.
+fn move_to_end(hit: &mut SurfaceHit, mesh: &Mesh, path: &NearLight) {
+    match &path.end {
+        Some((share, end)) => *hit = surface_hit(mesh, end, hit.passed * *share, hit.emits),
+        None => hit.passed = Rgb::ZERO,
+    }
+}
+
+/// A hit on the elements of `mesh`, of which this share arrives.
+fn surface_hit(mesh: &Mesh, hit: &Hit, passed: Rgb, emits: bool) -> SurfaceHit {
+    let (element, barycentric) = mesh.element_at(hit.triangle, hit.u, hit.v);
+    SurfaceHit { element: element as u32, barycentric, passed, emits }
 }
 
 /// The mean over the channels.

@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 use super::trace::{Ray, intersect, is_solid, walk};
 use crate::backend::gpu::layout::{HAS_HOLES, NOTHING, TracedLight, TracedPoint};
 use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::sampling::low_discrepancy::sobol_02_point;
 
 /// Transmittance of clear panes between the ray's near distance and `end`.
 pub fn passed(scene: &TracedArrays, ray: &Ray, end: f32) -> Vec3 {
@@ -31,21 +32,9 @@ pub fn ray_from(point: &TracedPoint, direction: Vec3) -> Ray {
     Ray { origin, origin_low, direction, near: point.near }
 }
 
-/// Point `k` of Sobol's (0,2)-sequence, in (0, 1)².
+/// Point `k` of Sobol's (0,2)-sequence, in [0, 1]².
 pub fn sobol(k: u32) -> Vec2 {
-    let mut remaining = k;
-    let mut column = 0x8000_0000u32;
-    let mut bits = 0;
-    while remaining != 0 {
-        if remaining & 1 != 0 {
-            bits ^= column;
-        }
-        remaining >>= 1;
-        column ^= column >> 1;
-    }
-    // A float has 24 bits; the offset to the middle of the cell is half of the last.
-    let unit = |bits: u32| ((bits >> 8) as f32 + 0.5) * 2f32.powi(-24);
-    Vec2::new(unit(k.reverse_bits()), unit(bits))
+    Vec2::from_array(sobol_02_point(k).map(|x| x as f32))
 }
 
 /// The same for sample `k` of a point, with both coordinates rotated.

@@ -2,17 +2,19 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
-use super::gather_state::{PointState, RankedLight, added_up};
-use super::hemisphere_rays::{HemisphereRays, range};
+use super::field::field_at;
+use super::gather_state::HalfSums;
 use super::lights::{passed, ray_from, to_light};
 use super::near_field::{is_covered, is_near};
+use super::ray_arrays::RayArrays;
+use super::shift::Shift;
 use super::sky::{from_sky, towards_sun};
-use super::trace::{Hit, is_hidden, nearest, nearest_but, turned};
+use super::trace::{Hit, Ray, is_hidden, nearest, nearest_but, turned};
 use crate::backend::gpu::layout::{
-    ANY_LIGHT, FAR, GatherSettings, LANES, LIFT, MAX_SURVIVAL, MAX_VERTICES, NOTHING, ROW_OF_FLAGS,
-    TracedPoint, TracedTriangle,
+    ANY_LIGHT, FAR, LIFT, MAX_SURVIVAL, MAX_VERTICES, NOTHING, PointState, ROW_OF_FLAGS,
+    RankedLight, RaySums, TracedPoint, TracedTriangle,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::NO_LIGHT;
@@ -42,54 +44,22 @@ impl Random {
     }
 }
 
-/// Deviations that rounding may cause: of directions, of points on lights, and of origins. The twin
-/// itself has none.
-#[derive(Clone, Copy)]
-pub struct Shift<'a> {
-    pub across: Vec2,
-    pub origin: Vec3,
-    pub turned: &'a dyn Fn(Vec3, Vec2) -> Vec3,
-}
-
-impl Shift<'_> {
-    fn direction(&self, direction: Vec3) -> Vec3 {
-        (self.turned)(direction, self.across)
-    }
-
-    fn moved(&self, at: Vec2) -> Vec2 {
-        (at + self.across).clamp(Vec2::ZERO, Vec2::ONE)
-    }
-
-    fn point(&self, point: TracedPoint) -> TracedPoint {
-        let position_low = (Vec3::from(point.position_low) + self.origin).to_array();
-        TracedPoint { position_low, ..point }
-    }
-}
-
-/// The paths of one pass from a point.
-pub fn follow_paths(
-    rays: &HemisphereRays,
+/// What ray `k` from a point adds: the light that a near surface reflects along it, by one path, if
+/// paths find it in that half.
+pub fn ray(
+    arrays: &RayArrays,
     point: &TracedPoint,
-    settings: &GatherSettings,
-    state: &mut PointState,
-) {
-    let [from, middle, to] = range(state.ray_count, state, settings);
-    let covered = covered_halves(state);
-    let none = Shift { across: Vec2::ZERO, origin: Vec3::ZERO, turned: &|direction, _| direction };
-    let mut lanes = [[Vec4::ZERO; LANES as usize]; 2];
-    for k in from..to {
-        let half = usize::from(k >= middle);
-        if covered[half] {
-            let light = near_light(rays, point, k, state, none);
-            let lane = &mut lanes[half][((k - from) % LANES) as usize];
-            *lane = (lane.truncate() + light).extend(lane.w.max(light.length()));
-        }
+    state: &PointState,
+    k: u32,
+    shift: Shift,
+) -> HalfSums {
+    let half = if state.pending == 3 && k < state.ray_count / 2 { 0 } else { 1 };
+    if !covered_halves(state)[half] {
+        return HalfSums::default();
     }
-    for (out, lanes) in state.rays.iter_mut().zip(lanes) {
-        let sum = added_up(lanes);
-        out.light = (Vec3::from(out.light) + sum.truncate()).to_array();
-        out.largest = lanes.iter().map(|lane| lane.w).fold(out.largest, f32::max);
-    }
+    let light = near_light(arrays, point, state, k, shift);
+    let (light, largest) = (light.to_array(), light.length());
+    HalfSums { rays: RaySums { light, largest, ..Default::default() }, ..Default::default() }
 }
 
 /// Of which halves paths find the light of near surfaces.
@@ -98,40 +68,40 @@ pub fn covered_halves(state: &PointState) -> [bool; 2] {
     state.rays.map(|sums| is_covered(sums.near, half as f32))
 }
 
-/// Light that near surfaces reflect along ray `k`, by one path.
-pub fn near_light(
-    rays: &HemisphereRays,
+/// Light that near surfaces reflect along ray `k`.
+fn near_light(
+    arrays: &RayArrays,
     point: &TracedPoint,
-    k: u32,
     state: &PointState,
+    k: u32,
     shift: Shift,
 ) -> Vec3 {
-    let direction = shift.direction(rays.direction(k, point));
+    let direction = shift.direction(arrays.direction(k, point.normal, point.rotation));
     let ray = ray_from(&shift.point(*point), direction);
-    let hit = nearest(rays.scene, &ray);
+    let hit = nearest(arrays.scene, &ray);
     if hit.triangle == NOTHING || !hit.front {
         return Vec3::ZERO;
     }
-    let there = rays.field_at(&hit);
-    if !is_near(rays.scene, &hit, there.side) {
+    let there = field_at(arrays, &hit);
+    if !is_near(arrays.scene, &hit, there.side) {
         return Vec3::ZERO;
     }
-    let passed = passed(rays.scene, &ray, hit.distance);
-    let path = Path { rays, state, shift, random: Random::of_ray(point, k) };
+    let passed = passed(arrays.scene, &ray, hit.distance);
+    let path = Path { arrays, state, shift, random: Random::of_ray(point, k) };
     passed * path.light(hit, there.reflectance)
 }
 
 struct Path<'a> {
-    rays: &'a HemisphereRays<'a>,
+    arrays: &'a RayArrays<'a>,
     state: &'a PointState,
-    shift: Shift<'a>,
+    shift: Shift,
     random: Random,
 }
 
 impl Path<'_> {
     /// Radiosity that a front with this reflectance reflects at a hit, without its emission.
     fn light(mut self, mut hit: Hit, mut reflectance: Vec3) -> Vec3 {
-        let scene = self.rays.scene;
+        let scene = self.arrays.scene;
         let mut sum = Vec3::ZERO;
         let mut throughput = Vec3::ONE;
         for vertex in 1..=MAX_VERTICES {
@@ -144,15 +114,7 @@ impl Path<'_> {
                 }
                 throughput /= survival;
             }
-            let (mut side, mut leaves) = (1.0, reflectance);
-            let sum_through = through.element_sum();
-            if sum_through > 0.0 {
-                let chance = sum_through / (sum_through + reflectance.element_sum());
-                (side, leaves) = match self.random.next() < chance {
-                    true => (-1.0, through / chance),
-                    false => (1.0, reflectance / (1.0 - chance)),
-                };
-            }
+            let (side, leaves) = self.choose_side(reflectance, through);
             throughput *= leaves;
             let at = self.shift.point(on_triangle(t, hit.u, hit.v, side));
             sum += throughput * self.irradiance_of_lights(&at);
@@ -171,16 +133,8 @@ impl Path<'_> {
                 return sum;
             }
             throughput *= passed(scene, &ray, hit.distance);
-            let next = &scene.triangles[hit.triangle as usize];
-            if next.light != NO_LIGHT {
-                let light = &scene.lights[next.light as usize];
-                let facing = (-normal_of(next).dot(direction)).max(0.0);
-                let above = Vec3::from(at.normal).dot(direction).max(0.0);
-                let factor = light.area * facing * above / (PI * hit.distance * hit.distance);
-                let share = balance(factor, chance_of(scene, self.state, next.light));
-                sum += throughput * Vec3::from(light.exitance) * share;
-            }
-            let there = self.rays.field_at(&hit);
+            sum += throughput * self.exitance_met(&at, &ray, &hit);
+            let there = field_at(self.arrays, &hit);
             if vertex == MAX_VERTICES || !is_near(scene, &hit, there.side) {
                 return sum + throughput * there.radiosity;
             }
@@ -189,10 +143,38 @@ impl Path<'_> {
         sum
     }
 
+    /// The side that a path goes on from, 1 for the front and -1 for the back, in proportion to the
+    /// light that leaves there, and what of the light leaves, over the probability of the choice.
+    fn choose_side(&mut self, reflectance: Vec3, through: Vec3) -> (f32, Vec3) {
+        let sum_through = through.element_sum();
+        if sum_through == 0.0 {
+            return (1.0, reflectance);
+        }
+        let chance = sum_through / (sum_through + reflectance.element_sum());
+        match self.random.next() < chance {
+            true => (-1.0, through / chance),
+            false => (1.0, reflectance / (1.0 - chance)),
+        }
+    }
+
+    /// Exitance at the hit of a ray from a vertex, with the share that the balance leaves to it.
+    fn exitance_met(&self, at: &TracedPoint, ray: &Ray, hit: &Hit) -> Vec3 {
+        let scene = self.arrays.scene;
+        let t = &scene.triangles[hit.triangle as usize];
+        if t.light == NO_LIGHT {
+            return Vec3::ZERO;
+        }
+        let light = &scene.lights[t.light as usize];
+        let facing = (-normal_of(t).dot(ray.direction)).max(0.0);
+        let above = Vec3::from(at.normal).dot(ray.direction).max(0.0);
+        let factor = light.area * facing * above / (PI * hit.distance * hit.distance);
+        Vec3::from(light.exitance) * balance(factor, chance_of(scene, self.state, t.light))
+    }
+
     /// Irradiance at a vertex from one point of a light, with the share that the balance leaves to
     /// it.
     fn irradiance_of_lights(&mut self, at: &TracedPoint) -> Vec3 {
-        let scene = self.rays.scene;
+        let scene = self.arrays.scene;
         if scene.info.lights == 0 {
             return Vec3::ZERO;
         }
@@ -209,7 +191,7 @@ impl Path<'_> {
 
     /// Irradiance at a vertex from one point of the sun.
     fn irradiance_of_sun(&mut self, at: &TracedPoint) -> Vec3 {
-        let scene = self.rays.scene;
+        let scene = self.arrays.scene;
         let at_square = Vec2::new(self.random.next(), self.random.next());
         let direction = self.shift.direction(towards_sun(scene, at_square));
         let cosine = Vec3::from(at.normal).dot(direction);

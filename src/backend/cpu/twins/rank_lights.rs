@@ -2,14 +2,14 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
-use super::gather_state::{PointState, RankedLight, added_up};
+use super::gather_state::added_up;
 use super::lights::{from_point, sobol, to_light};
 use crate::backend::cpu::gather::RAYS_PER_SHADOW_RAY;
 use crate::backend::gpu::layout::{
-    EVENNESS_POINTS, GatherSettings, LANES, MIN_IRRADIANCE_SHARE, MIN_RAYS, TracedLight,
-    TracedPoint, TracedTriangle,
+    EVENNESS_POINTS, GatherSettings, LANES, MIN_IRRADIANCE_SHARE, MIN_RAYS, PointState,
+    RankedLight, TracedLight, TracedPoint, TracedTriangle,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::gather::lights::MAX_EXPLICIT_LIGHTS;
@@ -143,12 +143,12 @@ fn is_wide(
     factor: f32,
     settings: &GatherSettings,
 ) -> bool {
-    let mut weights = [Vec4::ZERO; LANES as usize];
+    let mut weights = [Vec2::ZERO; LANES as usize];
     for lane in 0..EVENNESS_POINTS {
         let weight = to_light(scene, light, point, sobol(lane)).factor;
-        weights[lane as usize] = Vec2::new(weight, weight * weight).extend(0.0).extend(0.0);
+        weights[lane as usize] = Vec2::new(weight, weight * weight);
     }
-    let sum = added_up(weights);
+    let sum = added_up(weights, |sum, term| *sum += term);
     // Points of weights w have the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
     let worth = sum.x * sum.x / (sum.y * EVENNESS_POINTS as f32).max(1e-37);
     settings.min_rays as f32 * factor >= MIN_RAYS && factor * RAYS_PER_SHADOW_RAY as f32 > worth

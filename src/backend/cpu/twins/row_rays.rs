@@ -1,26 +1,17 @@
 //! Twin of `shaders/row_rays.wgsl`: cosine-distributed rays from patches, and the number that hits
 //! each element.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
 use super::element::element_at;
 use super::lights::passed;
-use super::trace::{Hit, Ray, nearest_but, turned};
+use super::ray_arrays::RayArrays;
+use super::trace::{Hit, Ray, nearest_but};
 use crate::backend::gpu::layout::{
     BACK, FAR, FIRST_FRONT, NOTHING, OPEN, RowSettings, TracedPatch,
 };
-use crate::backend::gpu::traced_scene::TracedArrays;
 
-/// Bindings of the shader.
-#[derive(Clone, Copy, Debug)]
-pub struct RowRays<'a> {
-    pub scene: &'a TracedArrays,
-    pub quadtrees: &'a [u32],
-    /// Coordinates along two tangents and the normal, ray by ray.
-    pub directions: &'a [[f32; 4]],
-}
-
-impl RowRays<'_> {
+impl RayArrays<'_> {
     /// Number of rays that hit each slot of a patch; with panes, followed by the sums of
     /// transmittances, one row per channel.
     pub fn row_rays(&self, patch: &TracedPatch, settings: &RowSettings) -> Vec<u32> {
@@ -28,19 +19,14 @@ impl RowRays<'_> {
         let rows = if self.scene.info.panes == NOTHING { 1 } else { 4 };
         let mut counts = vec![0; rows * slots];
         for k in 0..settings.rays {
-            let (slot, share) = self.cast_ray(patch, self.direction(k, patch));
+            let direction = self.direction(k, patch.normal, patch.rotation);
+            let (slot, share) = self.cast_ray(patch, direction);
             counts[slot as usize] += 1;
             for channel in 0..rows - 1 {
                 counts[(channel + 1) * slots + slot as usize] += amount(share[channel], settings);
             }
         }
         counts
-    }
-
-    /// The direction of ray `k`.
-    pub fn direction(&self, k: u32, patch: &TracedPatch) -> Vec3 {
-        let local = Vec4::from(self.directions[k as usize]).truncate();
-        turned(local, patch.normal.into(), patch.rotation)
     }
 
     /// A ray, and its hit.

@@ -148,11 +148,7 @@ pub fn walk(
 /// Converts a direction from two tangents and the normal, rotated about the latter: the tangents of
 /// Duff et al. 2017, "Building an orthonormal basis, revisited".
 pub fn turned(local: Vec3, n: Vec3, turns: f32) -> Vec3 {
-    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    let across = Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
-    let along = Vec3::new(b, sign + n.y * n.y * a, -n.y);
+    let (across, along) = n.any_orthonormal_pair();
     let (sine, cosine) = (TAU * turns).sin_cos();
     let x = across * cosine + along * sine;
     let y = along * cosine - across * sine;

@@ -55,22 +55,14 @@ fn item_buffer_and_reduce_equal_their_twins() {
                 lines.extend(line);
                 lines.resize(lines.len().next_multiple_of(stride(n) as usize), u32::MAX);
             }
-            let row = reduce::reduce(&lines, &weights, &table.slots, reduction, k);
-            let Row { entries, escaped, backface, .. } = &drawn[k as usize];
+            let twin = reduce::reduce(&lines, &weights, &table.slots, reduction, k);
+            let row = &drawn[k as usize];
             let mut device = vec![0; slots as usize];
-            device[OPEN as usize] = *escaped;
-            device[BACK as usize] = *backface;
-            entries.iter().for_each(|e| device[(FIRST_FRONT + e.element) as usize] = e.share);
-            let differ: Vec<_> = (0..row.len())
-                .filter(|&s| row[s] != device[s])
-                .map(|s| (s, device[s], row[s]))
-                .collect();
-            let symbols: Vec<char> = items.iter().map(|&i| symbol(i)).collect();
-            let seen = picture(n as usize, &symbols, &symbols, &vec![false; items.len()]);
-            assert!(
-                differ.is_empty(),
-                "{n} pixels, hemicube {k}: slots (device, twin) {differ:?}\n{seen}"
-            );
+            (device[OPEN as usize], device[BACK as usize]) = (row.escaped, row.backface);
+            for Entry { element, share } in &row.entries {
+                device[(FIRST_FRONT + element) as usize] = *share;
+            }
+            assert_eq!(device, twin, "{n} pixels, hemicube {k}");
         }
     }
 }

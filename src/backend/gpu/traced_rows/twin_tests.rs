@@ -1,16 +1,18 @@
 //! `row_rays.wgsl` and `compact_rows.wgsl` against their twins; and the same bits for any division
 //! of patches into calls.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use rustc_hash::FxHashSet;
 
 use super::*;
 use crate::backend::cpu::twins::compact_rows::compact_rows;
-use crate::backend::cpu::twins::row_rays::{RowRays, amount};
+use crate::backend::cpu::twins::ray_arrays::RayArrays;
+use crate::backend::cpu::twins::row_rays::amount;
+use crate::backend::cpu::twins::shift::Shift;
 use crate::backend::cpu::twins::trace::turned;
 use crate::backend::gpu::layout::{NOTHING, ROW_ENTRIES_HEADER_BYTES, TEXELS_PER_LINE};
 use crate::backend::gpu::test_support::{
-    gpu, on_sides, read_buffer, room_with_doubled_leaf, shifts, traced_scenes, turned_by,
+    gpu, on_sides, read_buffer, room_with_doubled_leaf, traced_scenes,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
 use crate::sampling::hash::split_mix64_nth;
@@ -43,13 +45,12 @@ fn patches(mesh: &Mesh) -> Vec<NodeId> {
     elements.chain([mesh.root(0)]).collect()
 }
 
-/// The number of hits of each slot is that of the twin, except for rays that rounding may deflect:
-/// see [`shifts`]; and the sum of transmittances is its sum, up to one unit per ray.
+/// The number of hits of each slot is that of the twin, except for rays that rounding may deflect;
+/// and the sum of transmittances is its sum, up to one unit per ray.
 #[test]
 #[cfg_attr(skip_gpu_tests, ignore = "RADIOSITY_NO_GPU is set")]
 fn row_rays_equal_their_twin() {
     let gpu = gpu();
-    let shifts = shifts();
     let (mut open, mut back, mut dimmed) = (0, 0, 0);
     for (name, mesh) in traced_scenes() {
         // Some lanes idle; directions in two lines of their texture.
@@ -57,82 +58,32 @@ fn row_rays_equal_their_twin() {
         let mut rows = open_rows(&gpu, &mesh, count);
         let lights = Lights::new(mesh.shared_scene());
         let (arrays, quadtrees) = (TracedArrays::new(&lights), quadtrees(&mesh));
-        let local = |&[x, y, z]: &[f64; 3]| [x as f32, y as f32, z as f32, 0.0];
-        let samples = HemisphereSamples::new(count).unwrap();
-        let directions: Vec<[f32; 4]> = samples.local().iter().map(local).collect();
-        let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
+        let directions = local_directions(&HemisphereSamples::new(count).unwrap());
+        let twin = RayArrays {
+            scene: &arrays,
+            quadtrees: &quadtrees,
+            elements: &[],
+            directions: &directions,
+        };
         let mut traced: Vec<TracedPatch> =
             patches(&mesh).iter().map(|&patch| rows.traced_patch(&mesh, patch)).collect();
-        // One above its own triangle that does not see the triangle in front of it.
-        let hit = |k: u32| twin.intersect(&traced[0], twin.direction(k, &traced[0])).1.triangle;
-        let before = (0..count).map(hit).find(|&triangle| triangle != NOTHING).unwrap();
-        let own_triangle = arrays.triangles[before as usize].index;
-        let lifted = Vec3::from(traced[0].position) + 1e-3 * Vec3::from(traced[0].normal);
-        traced.push(TracedPatch { position: lifted.to_array(), own_triangle, ..traced[0] });
+        traced.push(above_own_triangle(&twin, traced[0], count));
         let settings = rows.settings(count);
         let entries = rows.entries(&traced, settings, 0, <[_]>::to_vec).unwrap().unwrap();
-        let channels = if rows.has_panes { 4 } else { 1 };
         let slots = settings.slots as usize;
-        for (k, patch) in traced.iter().enumerate() {
+        for (k, patch) in (0..).zip(&traced) {
             let what = format!("{name}, patch {k}");
             let expected = twin.row_rays(patch, &settings);
-            assert_eq!(expected.len(), channels * slots);
-            let mut actual = vec![0; channels * slots];
-            for entry in entries.iter().filter(|entry| entry.patch_ == k as u32) {
+            let channels = expected.len() / slots;
+            let mut actual = vec![0; expected.len()];
+            for entry in entries.iter().filter(|entry| entry.patch_ == k) {
                 actual[entry.slot as usize] = entry.count;
-                for channel in 0..channels - 1 {
-                    actual[(channel + 1) * slots + entry.slot as usize] = entry.passed[channel];
+                for channel in 1..channels {
+                    actual[channel * slots + entry.slot as usize] = entry.passed[channel - 1];
                 }
             }
             assert_eq!(actual[..slots].iter().sum::<u32>(), count, "{what}");
-            // Range of each number.
-            let (mut low, mut high) = (vec![0; channels * slots], vec![0; channels * slots]);
-            let mut unsure = 0;
-            for ray in 0..count {
-                let direction = twin.direction(ray, patch);
-                let possible = |&(across, origin): &(Vec2, Vec3)| {
-                    let at = (Vec3::from(patch.position_low) + origin).to_array();
-                    let shifted = TracedPatch { position_low: at, ..*patch };
-                    twin.cast_ray(&shifted, turned_by(direction, across))
-                };
-                let results: Vec<(u32, Vec3)> = shifts.iter().map(possible).collect();
-                let is_sure = results.iter().all(|other| other.0 == results[0].0);
-                unsure += u32::from(!is_sure);
-                let mut seen = vec![];
-                for &(slot, _) in &results {
-                    if seen.contains(&slot) {
-                        continue;
-                    }
-                    seen.push(slot);
-                    let shares =
-                        results.iter().filter(|other| other.0 == slot).map(|other| other.1);
-                    let max = shares.clone().fold(Vec3::ZERO, Vec3::max);
-                    let min = shares.fold(Vec3::ONE, Vec3::min);
-                    let slot = slot as usize;
-                    high[slot] += 1;
-                    low[slot] += u32::from(is_sure);
-                    for channel in 0..channels - 1 {
-                        let at = (channel + 1) * slots + slot;
-                        high[at] += amount(max[channel], &settings) + 1;
-                        let min = amount(min[channel], &settings).saturating_sub(1);
-                        low[at] += if is_sure { min } else { 0 };
-                    }
-                }
-            }
-            for k in 0..channels * slots {
-                let (n, row) = (actual[k], k / slots);
-                assert!(
-                    (low[k]..=high[k]).contains(&n),
-                    "{what}, slot {} of row {row}: {n}, not {} to {}; the twin has {}",
-                    k % slots,
-                    low[k],
-                    high[k],
-                    expected[k]
-                );
-            }
-            // Some hundred sides of triangles and elements, a radian long each, are within 2⁻²⁰ of
-            // 2e-4 of all rays.
-            assert!(unsure * 200 < count, "{what}: {unsure} of {count} rays are unsure");
+            check_counts(&what, &twin, patch, &settings, &actual);
             (open, back) = (open + actual[OPEN as usize], back + actual[BACK as usize]);
             dimmed += (0..slots * usize::from(channels > 1))
                 .filter(|&k| actual[slots + k] > 0 && actual[slots + k] != actual[2 * slots + k])
@@ -144,6 +95,65 @@ fn row_rays_equal_their_twin() {
     }
     println!("{open} rays hit nothing, {back} backs; {dimmed} slots lie behind coloured glass");
     assert!(open > 0 && back > 0 && dimmed > 0);
+}
+
+/// A patch slightly above another, whose own triangle, which no ray hits, is the first in front of
+/// it.
+fn above_own_triangle(twin: &RayArrays, patch: TracedPatch, rays: u32) -> TracedPatch {
+    let direction = |k: u32| twin.direction(k, patch.normal, patch.rotation);
+    let hit = |k: u32| twin.intersect(&patch, direction(k)).1.triangle;
+    let first = (0..rays).map(hit).find(|&triangle| triangle != NOTHING).unwrap();
+    let own_triangle = twin.scene.triangles[first as usize].index;
+    let lifted = Vec3::from(patch.position) + 1e-3 * Vec3::from(patch.normal);
+    TracedPatch { position: lifted.to_array(), own_triangle, ..patch }
+}
+
+/// Checks that counts and sums of transmittances are those of the twin's rays, shifted or not.
+fn check_counts(
+    what: &str,
+    twin: &RayArrays,
+    patch: &TracedPatch,
+    settings: &RowSettings,
+    actual: &[u32],
+) {
+    let slots = settings.slots as usize;
+    let (mut low, mut high) = (vec![0; actual.len()], vec![0; actual.len()]);
+    let mut unsure = 0;
+    let shifts = Shift::all();
+    for ray in 0..settings.rays {
+        let direction = twin.direction(ray, patch.normal, patch.rotation);
+        let possible = |shift: &Shift| {
+            let position_low = (Vec3::from(patch.position_low) + shift.origin).to_array();
+            let patch = TracedPatch { position_low, ..*patch };
+            twin.cast_ray(&patch, shift.direction(direction))
+        };
+        let mut results: Vec<(u32, Vec3)> = shifts.iter().map(possible).collect();
+        results.sort_by_key(|&(slot, _)| slot);
+        let is_sure = results[0].0 == results[results.len() - 1].0;
+        unsure += u32::from(!is_sure);
+        for at_slot in results.chunk_by(|a, b| a.0 == b.0) {
+            let slot = at_slot[0].0 as usize;
+            let shares = at_slot.iter().map(|&(_, share)| share);
+            let max = shares.clone().fold(Vec3::ZERO, Vec3::max);
+            let min = shares.fold(Vec3::ONE, Vec3::min);
+            high[slot] += 1;
+            low[slot] += u32::from(is_sure);
+            for channel in 1..actual.len() / slots {
+                let at = channel * slots + slot;
+                high[at] += amount(max[channel - 1], settings) + 1;
+                let min = amount(min[channel - 1], settings).saturating_sub(1);
+                low[at] += if is_sure { min } else { 0 };
+            }
+        }
+    }
+    for (k, &n) in actual.iter().enumerate() {
+        let (slot, row, low, high) = (k % slots, k / slots, low[k], high[k]);
+        let is_possible = (low..=high).contains(&n);
+        assert!(is_possible, "{what}, slot {slot} of row {row}: {n}, not {low} to {high}");
+    }
+    // Some hundred sides of triangles and elements, a radian long each, are within 2⁻²⁰ of 2e-4 of
+    // all rays.
+    assert!(unsure * 200 < settings.rays, "{what}: {unsure} rays are unsure");
 }
 
 /// No ray passes through a side that two triangles share: in a closed room every ray has a hit,
@@ -178,7 +188,12 @@ fn no_ray_goes_through_a_shared_side() {
         assert_eq!(entries.iter().map(|entry| entry.count).sum::<u32>(), count);
         let open = entries.iter().find(|entry| entry.slot == OPEN);
         assert!(open.is_none(), "{patch:?}: {open:?} of {count}");
-        let twin = RowRays { scene: &arrays, quadtrees: &quadtrees, directions: &directions };
+        let twin = RayArrays {
+            scene: &arrays,
+            quadtrees: &quadtrees,
+            elements: &[],
+            directions: &directions,
+        };
         assert_eq!(twin.row_rays(&traced, &settings)[OPEN as usize], 0, "{patch:?}");
         cast += count;
     }
@@ -202,26 +217,7 @@ fn compact_rows_equals_its_twin() {
 
 fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32) {
     let patches: Vec<TracedPatch> = vec![Default::default(); 40];
-    let channels = if rows.has_panes { 4 } else { 1 };
-    let slots = slot_count as usize;
-    // Random counts in a third of the slots, including the first and the last.
-    let random = |k: usize| split_mix64_nth(k as u64) as u32;
-    let count = |k: usize| match (k % slots, k / slots % channels) {
-        (slot, 0) if slot == 0 || slot == slots - 1 || random(k).is_multiple_of(3) => {
-            random(k + 1).max(1)
-        }
-        (_, 0) => 0,
-        _ => random(k),
-    };
-    let mut counts: Vec<u32> = (0..patches.len() * channels * slots).map(count).collect();
-    // Without rays the transmittance is 0.
-    for row in counts.chunks_mut(channels * slots) {
-        let (rays, passed) = row.split_at_mut(slots);
-        for channel in passed.chunks_mut(slots) {
-            let unmet = channel.iter_mut().zip(&*rays).filter(|(_, rays)| **rays == 0);
-            unmet.for_each(|(sum, _)| *sum = 0);
-        }
-    }
+    let counts = random_counts(patches.len(), slot_count as usize, rows.has_panes);
     let on_device = rows.buffers.counts.clone();
     let write = || gpu.queue.write_buffer(&on_device, 0, bytemuck::cast_slice(&counts));
     write();
@@ -248,7 +244,9 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     assert!(rows.entries(&patches, settings, 0, |_| ()).unwrap().is_none(), "{what}");
     let actual: Vec<u32> = read_buffer(gpu, &rows.buffers.compacted.list);
     assert_eq!(actual[0] as usize, expected.len(), "{what}");
-    let (written, beyond) = entries_in(&actual)[..expected.len()].split_at(room);
+    let actual: &[RowEntry] =
+        bytemuck::cast_slice(&actual[ROW_ENTRIES_HEADER_BYTES as usize / 4..]);
+    let (written, beyond) = actual[..expected.len()].split_at(room);
     let expected: FxHashSet<[u32; 8]> = expected.iter().map(|e| bytemuck::cast(*e)).collect();
     let is_expected = |e: &RowEntry| expected.contains::<[u32; 8]>(&bytemuck::cast(*e));
     assert!(written.iter().all(is_expected), "{what}");
@@ -256,12 +254,32 @@ fn compare_entries(what: &str, gpu: &Gpu, rows: &mut TracedRows, slot_count: u32
     assert!(on_device().iter().all(|&n| n == 0), "{what}");
 }
 
-fn words(entries: &[RowEntry]) -> &[u32] {
-    bytemuck::cast_slice(entries)
+/// Random counts in a third of the slots of each row, including the first and the last; sums of
+/// transmittances where there are rays.
+fn random_counts(rows: usize, slots: usize, has_panes: bool) -> Vec<u32> {
+    let random = |k: usize| split_mix64_nth(k as u64) as u32;
+    let mut counts = vec![];
+    for row in 0..rows {
+        let first = row * slots;
+        let count = |slot: usize| match slot == 0 || slot == slots - 1 {
+            false if !random(first + slot).is_multiple_of(3) => 0,
+            _ => random(first + slot + 1).max(1),
+        };
+        let rays: Vec<u32> = (0..slots).map(count).collect();
+        counts.extend(&rays);
+        for channel in 1..if has_panes { 4 } else { 1 } {
+            let passed = |(slot, &rays): (usize, &u32)| match rays {
+                0 => 0,
+                _ => random((channel * rows + row) * slots + slot),
+            };
+            counts.extend(rays.iter().enumerate().map(passed));
+        }
+    }
+    counts
 }
 
-fn entries_in(actual: &[u32]) -> &[RowEntry] {
-    bytemuck::cast_slice(&actual[ROW_ENTRIES_HEADER_BYTES as usize / 4..])
+fn words(entries: &[RowEntry]) -> &[u32] {
+    bytemuck::cast_slice(entries)
 }
 
 #[test]
