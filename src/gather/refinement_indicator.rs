@@ -143,18 +143,6 @@ pub(super) fn is_finest(
     relative_size(samples, scale, settings, e) <= finest * min_edge
 }
 
-/// Whether the corners of element `e` say what light its middle has: at most four of the shortest
-/// edges. A beam of light may fall between the corners of larger ones.
-pub(super) fn is_small(
-    samples: &SampledMesh,
-    scale: &ErrorScale,
-    settings: &RefinementSettings,
-    e: usize,
-) -> bool {
-    let group_factor = settings.group_factor(samples.mesh.group(samples.mesh.element(e)));
-    relative_size(samples, scale, settings, e) <= 4.0 * settings.min_edge * group_factor
-}
-
 /// Squared relative error that element `e` is predicted to have, or that of the probe at its
 /// centroid if that is larger, times the area that it counts with; 0 where it may not be split.
 /// `source` is the light that the vertices gathered.
@@ -171,7 +159,9 @@ pub(super) fn squared_error(
     }
     let group_factor = settings.group_factor(samples.mesh.group(samples.mesh.element(e)));
     let weight = counted_area(samples, scale, settings, e) / (group_factor * group_factor);
-    let is_small = is_small(samples, scale, settings, e);
+    // A beam of light may fall between the corners of larger elements.
+    let is_small =
+        relative_size(samples, scale, settings, e) <= 4.0 * settings.min_edge * group_factor;
     let rms = predicted_rms(samples, source, scale.radiosity_floor, e, is_small);
     rms.map_or(UNKNOWN, |rms| weight * rms.max(probed).powi(2))
 }
