@@ -16,7 +16,6 @@ mod near_field;
 mod point_on;
 mod point_rows;
 mod scene_rays;
-
 mod wide_light;
 
 use std::f64::consts::PI;
