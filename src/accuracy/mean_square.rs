@@ -106,23 +106,10 @@ impl TrimmedSquare {
             }
         }
         let counted = (1.0 - tail) * area;
-        let strata = points.iter().map(|p| p.stratum + 1).max().unwrap_or(0);
-        let mut sums = vec![(0, 0.0, 0.0); strata];
-        for (point, square) in points.iter().zip(&winsorised) {
-            let sum = &mut sums[point.stratum];
-            *sum = (sum.0 + 1, sum.1 + point.area, sum.2 + point.area * square);
-        }
-        let mut variance = 0.0;
-        for (point, square) in points.iter().zip(&winsorised) {
-            let (count, area, sum) = sums[point.stratum];
-            let count = f64::from(count);
-            let off = point.area * (square - sum / area) / counted;
-            variance += off * off * count / (count - 1.0).max(1.0);
-        }
         let sum = |of: &dyn Fn(usize) -> f64| (0..points.len()).map(of).sum::<f64>();
         let mean = MeanSquare {
             value: sum(&|k| points[k].area * squares[k]) / counted,
-            variance,
+            variance: variance_of_mean(points, &winsorised, counted),
             noise: sum(&|k| (points[k].area * kept[k] / counted).powi(2) * points[k].error.noise),
             bias: sum(&|k| points[k].area * kept[k] * points[k].error.bias) / counted,
         };
@@ -133,6 +120,25 @@ impl TrimmedSquare {
         let tail = if tail > 0.0 { tail_squares.iter().sum::<f64>() / (tail * area) } else { 0.0 };
         Some(TrimmedSquare { mean, tail, in_tail, tail_squares })
     }
+}
+
+/// Variance of the mean of `squares` at `points` over the area `counted`: a ratio of two sums over
+/// random points of each stratum (Cochran 1977, equation 6.13).
+fn variance_of_mean(points: &[MeasuredPoint], squares: &[f64], counted: f64) -> f64 {
+    let strata = points.iter().map(|p| p.stratum + 1).max().unwrap_or(0);
+    let mut sums = vec![(0, 0.0, 0.0); strata];
+    for (point, square) in points.iter().zip(squares) {
+        let sum = &mut sums[point.stratum];
+        *sum = (sum.0 + 1, sum.1 + point.area, sum.2 + point.area * square);
+    }
+    let mut variance = 0.0;
+    for (point, square) in points.iter().zip(squares) {
+        let (count, area, sum) = sums[point.stratum];
+        let count = f64::from(count);
+        let off = point.area * (square - sum / area) / counted;
+        variance += off * off * count / (count - 1.0).max(1.0);
+    }
+    variance
 }
 
 impl MeanSquare {

@@ -42,6 +42,7 @@ pub(super) fn bake_in_time(
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
     let start = Instant::now();
+    let remaining = || limit.saturating_sub(start.elapsed()).as_secs_f64();
     // A tenth is left to the estimate of what was reached.
     let end = limit.mul_f64(0.9);
     let without_checkpoint = |settings: &mut BakeSettings| {
@@ -70,18 +71,11 @@ pub(super) fn bake_in_time(
             }
             (attempt, before) => (attempt?, before),
         };
-        let is_reached = goal.is_some_and(|goal| {
-            let BakeResult { estimate, groups, .. } = &baked;
-            goal.is_reached(TargetErrors { whole: estimate, by_light: estimate, groups }, stopped)
-        });
-        let short = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
-        let outcome = match goal {
-            // Only a time was asked for.
-            None => Outcome::Unasked,
-            Some(_) if is_reached => Outcome::Reached,
-            Some(_) if !stopped && error <= least => baked.outcome,
-            Some(_) => Outcome::Missed(short),
-        };
+        let interruption = if cancelled { Obstacle::Cancelled } else { Obstacle::Time };
+        let interruption = stopped.then_some(interruption);
+        let is_finest = error <= least;
+        let outcome = outcome_of(&baked, goal, interruption, is_finest);
+        let is_reached = matches!(outcome, Outcome::Reached);
         let is_better =
             |before: &BakeResult| error_of(before, each_group) <= error_of(&baked, each_group);
         let baked = match before {
@@ -89,10 +83,9 @@ pub(super) fn bake_in_time(
             _ => baked,
         };
         let baked = BakeResult { outcome, ..baked };
-        let is_last = is_reached || stopped || error <= least || baked.estimate.total == 0.0;
+        let is_last = is_reached || stopped || is_finest || baked.estimate.total == 0.0;
         let attempt = Attempt { error, taken: attempt_start.elapsed().as_secs_f64() };
-        let remaining = limit.saturating_sub(start.elapsed()).as_secs_f64();
-        let improvement = affordable_improvement(previous, attempt, remaining);
+        let improvement = affordable_improvement(previous, attempt, remaining());
         // Each bake starts from nothing: less than 1.3 is not worth another.
         if is_last || improvement < (error / least).min(1.3) {
             return Ok(baked);
@@ -100,6 +93,27 @@ pub(super) fn bake_in_time(
         best = Some(baked);
         previous = Some(attempt);
         error = (error / improvement).max(least);
+    }
+}
+
+/// The outcome of all bakes up to `baked`, which `interruption` ended, and which asked for the
+/// error of `goal` if it `is_finest`.
+fn outcome_of(
+    baked: &BakeResult,
+    goal: Option<ErrorTarget>,
+    interruption: Option<Obstacle>,
+    is_finest: bool,
+) -> Outcome {
+    // Only a time was asked for.
+    let Some(goal) = goal else { return Outcome::Unasked };
+    let BakeResult { estimate, groups, .. } = baked;
+    let errors = TargetErrors { whole: estimate, by_light: estimate, groups };
+    if goal.is_reached(errors, interruption.is_some()) {
+        return Outcome::Reached;
+    }
+    match interruption {
+        None if is_finest => baked.outcome,
+        obstacle => Outcome::Missed(obstacle.unwrap_or(Obstacle::Time)),
     }
 }
 

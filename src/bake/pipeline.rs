@@ -50,37 +50,20 @@ pub(super) fn run(
     let backend = &ResilientBackend::new(backend);
     let mut reporter = Reporter { backend, callback: progress };
     let mut clock = StageClock::start();
-    let finest = match &settings.gather {
-        Some(gather) => gather.refinement.min_edge,
-        None => settings.solve.element_size,
-    };
-    let scene = match target {
-        Some(target) => &with_creases(scene, model::crease_degrees(target.error)),
-        None => scene,
-    };
-    let scene = match &settings.solve.region {
-        Some(region) => &cut_large_triangles(scene, region),
-        None => scene,
-    };
-    let scene = &cut_at_contacts(scene, finest);
+    let scene = &cut_scene(settings, scene, target);
     let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
-    let source = match &settings.gather {
-        Some(_) if shot.solution.stop != StopReason::Cancelled => {
-            Some(GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?)
-        }
-        _ => None,
-    };
-    let baked = match (&settings.gather, &source) {
-        (Some(gather), Some(source)) => {
+    let by_elements = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
+    let baked = match &settings.gather {
+        Some(gather) if shot.solution.stop != StopReason::Cancelled => {
             let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
-            GatherPhase::new(settings, gather, target, mesh, source, &shot, backend)?
+            GatherPhase::new(settings, gather, target, mesh, &by_elements, &shot, backend)?
                 .run(&mut reporter, &mut clock)?
         }
         _ => shooting_phase::estimate_elements(
             &shot,
             settings,
             target,
-            GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?,
+            by_elements,
             backend,
             &mut reporter,
             &mut clock,
@@ -101,6 +84,28 @@ pub(super) fn run(
         device_failure: backend.failure(),
         timings: clock.timings,
     })
+}
+
+/// `scene` as it is meshed: with creases, and cut where a triangle is too large for the region of
+/// interest and where surfaces touch.
+fn cut_scene(
+    settings: &BakeSettings,
+    scene: &Arc<Scene>,
+    target: Option<ErrorTarget>,
+) -> Arc<Scene> {
+    let finest = match &settings.gather {
+        Some(gather) => gather.refinement.min_edge,
+        None => settings.solve.element_size,
+    };
+    let scene = match target {
+        Some(target) => &with_creases(scene, model::crease_degrees(target.error)),
+        None => scene,
+    };
+    let scene = match &settings.solve.region {
+        Some(region) => &cut_large_triangles(scene, region),
+        None => scene,
+    };
+    cut_at_contacts(scene, finest)
 }
 
 /// `scene`, with creases where it does not say and normals differ by more than this.

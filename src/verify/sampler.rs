@@ -273,48 +273,8 @@ impl<'a> Sampler<'a> {
     /// The result so far, and the mean square error of the whole.
     pub fn verification(&self) -> (Verification, MeanSquare) {
         let hidden = self.settings.hidden;
-        let mean_reflected = self.mean_reflected(hidden);
-        let floor = self.settings.measure.floor * mean_reflected;
         let counting = self.counting(hidden);
         let all = self.trimmed(&counting);
-        let errors = self.by_group(&counting);
-        // Those of the points that count, in the order of all.
-        let mut tails = all.in_tail.iter().copied();
-        // Noise may take the sum of a group below zero, where it has no part in the tail.
-        let mut squares = all.tail_squares.iter().copied();
-        let of_group =
-            |group: &Vec<MeasuredPoint>| squares.by_ref().take(group.len()).sum::<f64>().max(0.0);
-        let tails_of_groups: Vec<f64> = counting.iter().map(of_group).collect();
-        let tail_squares: f64 = tails_of_groups.iter().sum();
-        let (mut groups, mut points) = (vec![], vec![]);
-        let errors = errors.into_iter().zip(tails_of_groups);
-        for ((s, counting), (error, of_tail)) in self.strata.iter().zip(&counting).zip(errors) {
-            groups.push(GroupError {
-                group: s.surface.group,
-                area_share: s.surface.share,
-                points: s.points.len(),
-                hidden_share: s.hidden_share(),
-                error: error.map(|error| error.root()),
-                tail_share: if tail_squares > 0.0 { of_tail / tail_squares } else { 0.0 },
-                bias: error.map_or(0.0, |error| error.bias),
-            });
-            for traced in &s.points {
-                let Some(solution) = traced.solution else { continue };
-                let sample = traced.sample();
-                let counts = !counting.is_empty() && (hidden || !traced.hidden);
-                points.push(PointError {
-                    position: traced.point.position,
-                    normal: self.scene.normal(traced.point.triangle),
-                    group: s.surface.group,
-                    solution,
-                    measured: sample.measured(),
-                    standard_error: sample.variance().sqrt(),
-                    error: sample.square_error(floor).value.max(0.0).sqrt(),
-                    tail: if counts { tails.next().unwrap_or(0.0) } else { 0.0 },
-                    hidden: traced.hidden,
-                });
-            }
-        }
         let is_known = self.paths > 0 && self.missing() < self.drawn();
         let hidden_share: f64 =
             self.strata.iter().map(|s| s.surface.share * s.hidden_share()).sum();
@@ -333,14 +293,72 @@ impl<'a> Sampler<'a> {
             error_with_tail: is_known.then(|| plain.root()),
             error_with_hidden: is_known.then(|| with_hidden.root()),
             hidden_share,
-            groups,
-            points,
-            mean_reflected,
+            groups: self.group_errors(&counting, &all),
+            points: self.point_errors(&counting, &all),
+            mean_reflected: self.mean_reflected(hidden),
             paths: self.paths,
             missing: self.missing(),
             stop: Stop::Cancelled,
         };
         (verification, all.mean)
+    }
+
+    /// The error of every group, and its share of the tail of `all`, the points `counting`.
+    fn group_errors(
+        &self,
+        counting: &[Vec<MeasuredPoint>],
+        all: &TrimmedSquare,
+    ) -> Vec<GroupError> {
+        // Noise may take the sum of a group below zero, where it has no part in the tail.
+        let mut squares = all.tail_squares.iter().copied();
+        let of_group =
+            |group: &Vec<MeasuredPoint>| squares.by_ref().take(group.len()).sum::<f64>().max(0.0);
+        let tails: Vec<f64> = counting.iter().map(of_group).collect();
+        let tail_squares: f64 = tails.iter().sum();
+        let errors = self.strata.iter().zip(self.by_group(counting)).zip(tails);
+        let group_error = |((s, error), tail): ((&Stratum, Option<MeanSquare>), f64)| GroupError {
+            group: s.surface.group,
+            area_share: s.surface.share,
+            points: s.points.len(),
+            hidden_share: s.hidden_share(),
+            error: error.map(|error| error.root()),
+            tail_share: if tail_squares > 0.0 { tail / tail_squares } else { 0.0 },
+            bias: error.map_or(0.0, |error| error.bias),
+        };
+        errors.map(group_error).collect()
+    }
+
+    /// The errors of the points where the solution is known, with their shares in the tail of
+    /// `all`, the points `counting`.
+    fn point_errors(
+        &self,
+        counting: &[Vec<MeasuredPoint>],
+        all: &TrimmedSquare,
+    ) -> Vec<PointError> {
+        let hidden = self.settings.hidden;
+        let floor = self.settings.measure.floor * self.mean_reflected(hidden);
+        // Those of the points that count, in the order of all.
+        let mut tails = all.in_tail.iter().copied();
+        let mut points = vec![];
+        for (s, counting) in self.strata.iter().zip(counting) {
+            for traced in &s.points {
+                let Some(solution) = traced.solution else { continue };
+                let sample = traced.sample();
+                let counts = !counting.is_empty() && (hidden || !traced.hidden);
+                points.push(PointError {
+                    position: traced.point.position,
+                    normal: self.scene.normal(traced.point.triangle),
+                    group: s.surface.group,
+                    solution,
+                    measured: sample.measured(),
+                    standard_error: sample.variance().sqrt(),
+                    error: sample.square_error(floor).value.max(0.0).sqrt(),
+                    tail: if counts { tails.next().unwrap_or(0.0) } else { 0.0 },
+                    hidden: traced.hidden,
+                });
+            }
+        }
+        points
     }
 }
 

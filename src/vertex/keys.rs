@@ -147,39 +147,9 @@ impl Vertices {
         topology: &SurfaceTopology,
         elements: &[usize],
     ) -> (Vertices, Vec<Option<u32>>) {
-        // Of each element of `finer` the one that it was; none of a part of one that was split.
-        let mut old_elements = Vec::with_capacity(finer.element_count());
-        // Between two vertices of which one is at no split element there is no new one.
-        let mut is_at_split = vec![false; self.keys.len()];
-        let mut elements = elements.iter().peekable();
-        for (e, corners) in self.corners.iter().enumerate() {
-            if elements.next_if_eq(&&e).is_some() {
-                old_elements.extend([None; 4]);
-                corners.iter().for_each(|&v| is_at_split[v as usize] = true);
-            } else {
-                old_elements.push(Some(e));
-            }
-        }
-        let place_of = |f: usize, k: usize| {
-            let node = finer.element(f);
-            (finer.triangle(node), lattice_corners(finer.cell(node))[k])
-        };
-        let key_of = |(t, point): (usize, [u32; 2])| vertex_key(topology, t, point);
-        // Until all are known, old vertices have their old numbers, and new ones those from the
-        // number of old ones on.
-        let old_corners = |(f, old): (usize, &Option<usize>)| match old {
-            Some(e) => self.corners[*e],
-            None => [0, 1, 2].map(|k| self.index_of(&key_of(place_of(f, k))).unwrap_or(UNNUMBERED)),
-        };
-        let mut corners: Vec<[u32; 3]> =
-            old_elements.par_iter().enumerate().map(old_corners).collect();
+        let old_elements = self.old_elements(elements);
+        let (mut corners, new) = self.split_corners(finer, topology, &old_elements);
         let old_count = self.keys.len();
-        let mut new = Vertices::default();
-        for (f, corners) in corners.iter_mut().enumerate() {
-            for (k, v) in corners.iter_mut().enumerate().filter(|(_, v)| **v == UNNUMBERED) {
-                *v = old_count as u32 + new.number(finer, topology, place_of(f, k));
-            }
-        }
         // They are numbered in the order in which the corners of elements name them.
         let count = old_count + new.keys.len();
         let naming = naming_corners(corners.as_flattened(), count);
@@ -191,7 +161,7 @@ impl Vertices {
         }
         corners.as_flattened_mut().par_iter_mut().for_each(|v| *v = numbers[*v as usize]);
         let places = naming.par_iter().map(|&corner| {
-            let (t, point) = place_of(corner as usize / 3, corner as usize % 3);
+            let (t, point) = corner_place(finer, corner as usize / 3, corner as usize % 3);
             (t as u32, point)
         });
         let places: Vec<(u32, [u32; 2])> = places.collect();
@@ -215,19 +185,68 @@ impl Vertices {
         };
         split.index.iter_mut().for_each(|v| *v = numbers[*v as usize]);
         numbers[old_count..].iter().for_each(|&v| split.add_to_index(v));
-        let old_number = |v: u32| Some(v).filter(|&v| (v as usize) < old_count);
-        let old_numbers = by_number.into_par_iter().map(old_number).collect();
+        let mut is_at_split = vec![false; old_count];
+        let at_split = elements.iter().flat_map(|&e| self.corners[e]);
+        at_split.for_each(|v| is_at_split[v as usize] = true);
         split.outlines = outlines_of(finer, |f, outline| {
-            let old_outline = old_elements[f].map(|e| self.outlines.of(e)).filter(|old| {
-                let is_at_split = |k: usize| is_at_split[old[k % old.len()] as usize];
-                !(0..old.len()).any(|k| is_at_split(k) && is_at_split(k + 1))
-            });
-            match old_outline {
+            match old_elements[f].and_then(|e| self.kept_outline(e, &is_at_split)) {
                 Some(old) => outline.extend(old.iter().map(|&v| numbers[v as usize])),
                 None => split.add_outline(finer, topology, f, outline, &mut |_| None),
             }
         });
-        (split, old_numbers)
+        let old_number = |v: u32| Some(v).filter(|&v| (v as usize) < old_count);
+        (split, by_number.into_par_iter().map(old_number).collect())
+    }
+
+    /// Of each element after `elements` (ascending) are split the element that it was; none of a
+    /// part of one that is split.
+    fn old_elements(&self, elements: &[usize]) -> Vec<Option<usize>> {
+        let mut old_elements = Vec::with_capacity(self.corners.len() + 3 * elements.len());
+        let mut elements = elements.iter().peekable();
+        for e in 0..self.corners.len() {
+            match elements.next_if_eq(&&e) {
+                Some(_) => old_elements.extend([None; 4]),
+                None => old_elements.push(Some(e)),
+            }
+        }
+        old_elements
+    }
+
+    /// The vertices at the corners of the elements of `finer`, and the new ones among them: old
+    /// ones have their old numbers, and new ones those from the number of old ones on.
+    fn split_corners(
+        &self,
+        finer: &Mesh,
+        topology: &SurfaceTopology,
+        old_elements: &[Option<usize>],
+    ) -> (Vec<[u32; 3]>, Vertices) {
+        let old_corner = |f: usize, k: usize| {
+            let (t, point) = corner_place(finer, f, k);
+            self.index_of(&vertex_key(topology, t, point)).unwrap_or(UNNUMBERED)
+        };
+        let old_corners = |(f, old): (usize, &Option<usize>)| match old {
+            Some(e) => self.corners[*e],
+            None => [0, 1, 2].map(|k| old_corner(f, k)),
+        };
+        let mut corners: Vec<[u32; 3]> =
+            old_elements.par_iter().enumerate().map(old_corners).collect();
+        let mut new = Vertices::default();
+        for (f, corners) in corners.iter_mut().enumerate() {
+            for (k, v) in corners.iter_mut().enumerate().filter(|(_, v)| **v == UNNUMBERED) {
+                let number = new.number(finer, topology, corner_place(finer, f, k));
+                *v = self.keys.len() as u32 + number;
+            }
+        }
+        (corners, new)
+    }
+
+    /// The outline of element `e`, if no vertex can have come into it: between two vertices of
+    /// which one is at no split element there is no new one.
+    fn kept_outline(&self, e: usize, is_at_split: &[bool]) -> Option<&[u32]> {
+        let outline = self.outlines.of(e);
+        let is_at_split = |k: usize| is_at_split[outline[k % outline.len()] as usize];
+        let is_halved = (0..outline.len()).any(|k| is_at_split(k) && is_at_split(k + 1));
+        (!is_halved).then_some(outline)
     }
 
     /// The index of the vertex with this key.
@@ -344,6 +363,12 @@ fn lattice_midpoint(a: [u32; 2], b: [u32; 2]) -> Option<[u32; 2]> {
 /// Corners of `cell` on the finest lattice of its triangle.
 fn lattice_corners(cell: Cell) -> [[u32; 2]; 3] {
     cell.lattice_corners().map(|c| c.map(|k| k * (LATTICE_STEPS >> cell.level)))
+}
+
+/// Corner `k` of element `e`: its triangle, and the point on its lattice.
+fn corner_place(mesh: &Mesh, e: usize, k: usize) -> (usize, [u32; 2]) {
+    let node = mesh.element(e);
+    (mesh.triangle(node), lattice_corners(mesh.cell(node))[k])
 }
 
 /// Lattice steps as a fraction of a triangle's side.
