@@ -355,6 +355,31 @@ mod tests {
         }
     }
 
+    /// Elements of two triangles, split once, with light that is linear but for the vertex in the
+    /// middle of the common side, which is a tenth brighter.
+    #[test]
+    fn squared_error_is_that_of_a_parabola_times_the_area() {
+        let mesh = ground();
+        let even = GatheredMesh::from_elements(&mesh, &[Rgb::ONE; 2]).unwrap();
+        let field = even.radiosity_field();
+        let scale = ErrorScale::new(&mesh, &field, None, Measure::default());
+        let mut samples = SampledMesh::new(mesh, &field);
+        samples.split(&[0, 1]).unwrap();
+        let middle = DVec3::new(32.0, 32.0, 0.0);
+        let positions = samples.vertices.positions.clone();
+        for (value, position) in samples.reflected.iter_mut().zip(&positions) {
+            *value = Rgb::splat(if position.distance(middle) < 1e-9 { 1.1 } else { 1.0 });
+        }
+        samples.noise.fill(0.0);
+        // The surplus s of a parent is 0.1 of the darkest corner: e = s/8, over an area of 512.
+        let settings = RefinementSettings::new(1.0);
+        for e in 0..8 {
+            let square = squared_error(&samples, &field, &scale, &settings, e, 0.0);
+            let expected = 512.0 * (0.1_f64 / 8.0).powi(2);
+            assert!((square / expected - 1.0).abs() < 1e-12, "{e}: {square}, not {expected}");
+        }
+    }
+
     /// Elements, children of two triangles, have buried corners only.
     #[test]
     fn elements_on_buried_corners_are_split_where_there_was_light() {

@@ -258,6 +258,12 @@ fn what_is_hidden_is_left_out_and_said() {
     let all = verify(&scene, &lit, &settings, keep_going).unwrap();
     assert_eq!(all.error, all.error_with_hidden);
     assert!(all.groups[0].error.unwrap().value > 10.0);
+    // Nothing is reflected in the hidden quarter, of 2.05 in all: the mean is over the rest. Values
+    // differ by 0.4 of it, and there are a thousand points or more: three standard errors of a
+    // ratio of two means are 0.054.
+    assert!(found.points.len() >= 1000 && all.points.len() >= 1000);
+    let ratio = found.mean_reflected / all.mean_reflected;
+    assert!((ratio - 2.05 / 1.8).abs() < 0.06, "{ratio}");
 }
 
 #[test]
