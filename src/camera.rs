@@ -15,9 +15,6 @@ mod interpolated;
 mod optics;
 mod second_pass;
 mod textured;
-mod up_axis;
-
-pub use up_axis::up_axis;
 
 use std::f64::consts::PI;
 use std::ops::Range;

@@ -18,6 +18,7 @@
 mod measuring_grid;
 mod plane;
 mod quantity;
+mod rooms;
 mod settings;
 mod statistics;
 mod surface;
@@ -65,8 +66,9 @@ impl MeasuringGrid {
         MeasuringGrid::filling(name, inner, settings, |_| true)
     }
 
-    /// Grids `height` metres above each floor of `scene`, the lowest first. A floor faces `up`, is
-    /// connected, has at least four square metres and is wider than both strips.
+    /// Grids `height` metres above the floor of each room of `scene`, the lowest first. A floor
+    /// faces `up`, is connected, has at least four square metres and is wider than both strips;
+    /// walls part it into rooms. Roofs, in the open above another floor, are not floors.
     ///
     /// # Errors
     /// Those of [`GridSettings::counts`].
@@ -78,8 +80,11 @@ impl MeasuringGrid {
     ) -> Result<Vec<MeasuringGrid>, Error> {
         let metre = settings.checked()?.metre;
         let floors = LevelSurface::floors(scene, up.normalize_or_zero(), metre);
-        let grids = floors.iter().map(|floor| floor.grid(scene, height * metre, settings));
-        grids.filter_map(Result::transpose).collect()
+        let mut grids = vec![];
+        for floor in LevelSurface::without_roofs(floors, scene, metre) {
+            grids.extend(floor.grids_of_rooms(scene, height * metre, settings)?);
+        }
+        Ok(grids)
     }
 
     /// The grid `height` metres above the group of this name: above its highest side that faces

@@ -27,6 +27,7 @@ mod sky_map;
 mod specular;
 pub mod texture;
 mod textured;
+mod up_axis;
 mod warning;
 
 use std::any::Any;
@@ -58,6 +59,7 @@ pub use sky_distribution::SkyDistribution;
 pub(crate) use sky_map::SkyMap;
 pub use specular::Specular;
 use texture::MaterialTextures;
+pub use up_axis::UpAxis;
 pub use warning::{Warning, WarningKind};
 
 /// A face of the scene: counter-clockwise corners seen from its front.
@@ -87,6 +89,10 @@ pub struct Scene {
     /// See [`Scene::coordinate_ulp`].
     coordinate_ulp: f64,
     warnings: Vec<Warning>,
+    /// See [`Scene::comments`].
+    comments: Arc<[String]>,
+    /// See [`Scene::up`].
+    up: Option<DVec3>,
     /// See [`Scene::sky`].
     sky: Sky,
     /// See [`Scene::luminaires`].
@@ -171,6 +177,8 @@ impl Scene {
             degenerate,
             coordinate_ulp: f64::EPSILON * largest,
             warnings: vec![],
+            comments: Arc::default(),
+            up: None,
             sky: Sky::default(),
             luminaires: Arc::default(),
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
@@ -399,6 +407,16 @@ impl Scene {
     /// smooth surfaces and other data that this module does not define.
     pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
         self.derived.get(|| make(self))
+    }
+
+    /// The comments before the geometry of its file, without `#`: often the program that wrote it.
+    pub(crate) fn comments(&self) -> &[String] {
+        &self.comments
+    }
+
+    /// The same scene with these comments.
+    pub(crate) fn with_comments(self, comments: Vec<String>) -> Scene {
+        Scene { comments: comments.into(), ..self }
     }
 
     pub(crate) fn warn(&mut self, warning: Warning) {

@@ -13,7 +13,6 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::Camera;
-use super::up_axis::up_axis;
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::sampling::low_discrepancy::{r2_point, radical_inverse};
@@ -28,7 +27,7 @@ impl Camera {
     pub fn framing(light: &GatheredMesh, aspect: f64) -> Camera {
         let scene = light.mesh.scene();
         let (bounds, flux) = lit_box(light);
-        let framing = Framing { rays: &RayScene::of_scene(scene), bounds, up: up_axis(scene) };
+        let framing = Framing { rays: &RayScene::of_scene(scene), bounds, up: scene.up() };
         let from = |elevation: f64, first: f64| {
             let view = |k: u32| framing.forward(elevation, first + f64::from(k) / 4.0);
             (1..4).map(view).fold(view(0), |a, b| if b.dot(flux) < a.dot(flux) { b } else { a })

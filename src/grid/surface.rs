@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::measuring_grid::MeasuringGrid;
 use super::plane::GridPlane;
+use super::rooms::{FloorRaster, MIN_AREA};
 use super::settings::GridSettings;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::geometry::rectangle::Rectangle;
@@ -56,8 +57,7 @@ impl LevelSurface {
             parts[joined.find(k)].push(t);
         }
         let is_large = |part: &Vec<usize>| {
-            // 4 m²: more than tables have.
-            part.iter().map(|&t| scene.area(t)).sum::<f64>() >= 4.0 * metre * metre
+            part.iter().map(|&t| scene.area(t)).sum::<f64>() >= MIN_AREA * metre * metre
         };
         let large = parts.into_iter().filter(is_large);
         let mut floors: Vec<LevelSurface> =
@@ -116,24 +116,82 @@ impl LevelSurface {
         height: f64,
         settings: &GridSettings,
     ) -> Result<Option<MeasuringGrid>, Error> {
+        let footprint = Footprint::new(self, scene);
+        match self.plane(scene, height) {
+            Some(plane) => self.filled(self.name.clone(), plane, settings, |p| footprint.has(p)),
+            None => Ok(None),
+        }
+    }
+
+    /// The grid in `plane` less the strip, of points from which all around, as far as the strip is
+    /// wide, `has` is true. None if no point is left.
+    fn filled(
+        &self,
+        name: String,
+        plane: GridPlane,
+        settings: &GridSettings,
+        has: impl Fn(DVec3) -> bool,
+    ) -> Result<Option<MeasuringGrid>, Error> {
         let strip = settings.strip_in_scene()?;
-        let Some(inner) = self.plane(scene, height).and_then(|plane| plane.without(strip)) else {
-            return Ok(None);
-        };
-        let surface = RayScene::new(self.triangles.iter().map(|&t| scene.corners(t)));
-        let size = scene.bounds().longest_side() + height.abs();
-        let is_over = |p: DVec3| {
-            let (above, reach) = (p + self.normal * size, 0.0..2.0 * size);
-            surface.occluded(above, -self.normal, reach, |_| true)
-        };
+        let Some(inner) = plane.without(strip) else { return Ok(None) };
         let axes = self.axes(&inner);
         let around = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / 8.0).sin_cos();
             strip * (cos * axes[0] + sin * axes[1])
         };
-        let inside = |p: DVec3| is_over(p) && (0..8).all(|k| is_over(p + around(k)));
-        let grid = MeasuringGrid::filling(self.name.clone(), inner, settings, inside)?;
+        let inside = |p: DVec3| has(p) && (0..8).all(|k| has(p + around(k)));
+        let grid = MeasuringGrid::filling(name, inner, settings, inside)?;
         Ok(grid.points.iter().any(Option::is_some).then_some(grid))
+    }
+
+    /// The grids `height` above each of its rooms, scene unit; numbered where there are several.
+    pub fn grids_of_rooms(
+        &self,
+        scene: &Scene,
+        height: f64,
+        settings: &GridSettings,
+    ) -> Result<Vec<MeasuringGrid>, Error> {
+        let Some(plane) = self.plane(scene, 0.0) else { return Ok(vec![]) };
+        let rays = RayScene::of_scene(scene);
+        let footprint = Footprint::new(self, scene);
+        let raster = FloorRaster::new(&rays, plane, settings.metre, |p| footprint.has(p));
+        let Some(raster) = raster else {
+            return Ok(self.grid(scene, height, settings)?.into_iter().collect());
+        };
+        let lift = self.normal * height;
+        let mut grids = vec![];
+        for room in 0..raster.room_count() {
+            let name = match raster.room_count() {
+                1 => self.name.clone(),
+                _ => format!("{} {}", self.name, room + 1),
+            };
+            let plane = if raster.room_count() == 1 { plane } else { raster.rectangle(room) };
+            let plane = GridPlane { origin: plane.origin + lift, ..plane };
+            let is_in_room = |p: DVec3| footprint.has(p) && raster.room_at(p - lift) == Some(room);
+            grids.extend(self.filled(name, plane, settings, is_in_room)?);
+        }
+        Ok(grids)
+    }
+
+    /// Those of `floors` that are no roofs; all where there would be none.
+    pub fn without_roofs(
+        floors: Vec<LevelSurface>,
+        scene: &Scene,
+        metre: f64,
+    ) -> Vec<LevelSurface> {
+        let footprints: Vec<Footprint> =
+            floors.iter().map(|floor| Footprint::new(floor, scene)).collect();
+        let rays = RayScene::of_scene(scene);
+        let is_roof = |k: usize| {
+            let Some(plane) = floors[k].plane(scene, 0.0) else { return false };
+            let raster = FloorRaster::new(&rays, plane, metre, |p| footprints[k].has(p));
+            let is_below = |p: DVec3| footprints[..k].iter().any(|below| below.has(p));
+            raster.is_some_and(|raster| raster.is_roof(is_below))
+        };
+        let roofs: Vec<bool> = (0..floors.len()).map(is_roof).collect();
+        let has_floor = roofs.contains(&false);
+        let kept = floors.into_iter().zip(roofs).filter(|(_, is_roof)| !(*is_roof && has_floor));
+        kept.map(|(floor, _)| floor).collect()
     }
 
     /// Unit vectors along the first edge of `plane`, and across it.
@@ -164,6 +222,28 @@ impl LevelSurface {
             }
         }
         Some(GridPlane { origin, edges })
+    }
+}
+
+/// Where a level surface is, from above.
+struct Footprint {
+    triangles: RayScene,
+    normal: DVec3,
+    /// A distance beyond all of the scene.
+    size: f64,
+}
+
+impl Footprint {
+    fn new(surface: &LevelSurface, scene: &Scene) -> Footprint {
+        let triangles = RayScene::new(surface.triangles.iter().map(|&t| scene.corners(t)));
+        let size = 2.0 * scene.bounds().longest_side();
+        Footprint { triangles, normal: surface.normal, size }
+    }
+
+    /// Whether it is above or below `p`.
+    fn has(&self, p: DVec3) -> bool {
+        let (above, reach) = (p + self.normal * self.size, 0.0..2.0 * self.size);
+        self.triangles.occluded(above, -self.normal, reach, |_| true)
     }
 }
 

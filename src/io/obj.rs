@@ -189,7 +189,7 @@ impl<'a> ObjFile<'a> {
         let emitting = scene.materials().iter().enumerate().filter(is_used).map(|(_, m)| m);
         let (sky, dark) = lights::sky_and_warning(emitting, settings.sky.as_ref(), &settings.emit);
         self.repairs.into_warnings().into_iter().chain(dark).for_each(|w| scene.warn(w));
-        scene.with_sky(sky)
+        scene.with_comments(self.statements.comments).with_sky(sky)
     }
 
     /// The error that there is no face, with counts of the content.

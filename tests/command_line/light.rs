@@ -123,3 +123,46 @@ fn probes_are_written_as_json_and_csv() {
     };
     assert!((at(1.0) / (100.0 * PI) - 1.0).abs() < 0.05, "{}", at(1.0));
 }
+
+/// A closed room, 3 m high along z, with these names of its floor and its ceiling: its shape says
+/// nothing about which way is up.
+fn shoebox(folder: &Path, [floor, ceiling]: [&str; 2]) -> PathBuf {
+    let scene = format!(
+        "v 0 0 0\nv 6 0 0\nv 6 4 0\nv 0 4 0\nv 0 0 3\nv 6 0 3\nv 6 4 3\nv 0 4 3\n\
+         g {floor}\nf 1 2 3 4\ng {ceiling}\nf 8 7 6 5\n\
+         g s\nf 1 5 6 2\ng n\nf 3 7 8 4\ng w\nf 1 4 8 5\ng e\nf 2 6 7 3\n"
+    );
+    write(folder, "shoebox.obj", &scene)
+}
+
+/// Which way is up follows from names, and from where luminaires hang; it is printed, and warned of
+/// where nothing says it.
+#[test]
+fn up_follows_from_names_and_luminaires() {
+    let folder = tempfile::tempdir().unwrap();
+    let even = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n100 100\n";
+    let lamp = write(folder.path(), "lamp.ies", even).display().to_string();
+    let up = |names, at: &str, more: &[&str]| {
+        let scene = shoebox(folder.path(), names).display().to_string();
+        let lamp = format!("{lamp}@{at}");
+        let mut args = vec![&scene, "--photometric", "--luminaire", &lamp, "--error", "0.2"];
+        args.extend(more);
+        args.extend(device());
+        let out = run("grid", &args);
+        let said = String::from_utf8(out.stderr).unwrap();
+        let rows = table(&folder.path().join("shoebox.grid.csv"));
+        let line = said.lines().find(|line| line.starts_with("up: ")).map(String::from);
+        (line.unwrap(), said.contains("--up"), rows[1][0].clone(), number(&rows[1][5]))
+    };
+    let names = "up: +z, from surfaces named 'Floor', 'Ceiling'";
+    let high = "3,2,2.9";
+    let found = up(["Floor", "Ceiling"], "3,2,1.5", &[]);
+    assert_eq!(found, (names.into(), false, "1 Floor".into(), 0.8));
+    let lamps = "up: +z, from luminaires near the top along +z";
+    assert_eq!(up(["a", "b"], high, &[]), (lamps.into(), false, "1 a".into(), 0.8));
+    let given = up(["a", "b"], "3,2,1.5", &["--up", "0,0,1"]);
+    assert_eq!(given, ("up: +z".into(), false, "1 a".into(), 0.8));
+    let (line, warned, grid, _) = up(["a", "b"], "3,2,1.5", &[]);
+    assert_eq!(line, "up: +y, the default of OBJ files");
+    assert!(warned && grid == "1 s", "{grid}");
+}

@@ -72,18 +72,20 @@ fn points_are_in_the_middles_of_the_cells_of_a_plane() {
     }
 }
 
-/// A turned room with a table, and a floor above it: tables are too small to be floors.
+/// A turned house of two storeys with a table: tables are too small to be floors.
 #[test]
 fn floors_are_found_however_the_house_is_turned() {
     let (sin, cos) = (0.5f64).sin_cos();
     let turn = |[x, y, z]: [f64; 3]| [x * cos - y * sin + 7.0, x * sin + y * cos, z];
     let mut parts = walls([0.0; 3], [6.0, 4.0, 2.5]).to_vec();
     parts.extend(standing_block([2.0, 3.5], [1.0, 2.0], 0.0, 0.7));
-    parts.push(facing_up([0.0, 6.0], [0.0, 4.0], 2.6));
+    parts.extend(walls([0.0, 0.0, 2.6], [6.0, 4.0, 5.1]));
+    // The roof is no floor, and neither is a strip as narrow as those that are left out.
+    parts.push(facing_up([-1.0, 7.0], [-1.0, 5.0], 5.3));
     parts.push(facing_up([0.0, 0.9], [5.0, 12.0], 0.0));
     let parts: Vec<Quad> = parts.into_iter().map(|part| part.map(turn)).collect();
     let grids = floors(&scene(&parts), &METRES);
-    assert_eq!(grids.len(), 2, "no table, and nothing as narrow as its strips: {grids:?}");
+    assert_eq!(grids.len(), 2, "{grids:?}");
     for (grid, height) in grids.iter().zip([0.8, 3.4]) {
         // 5 m by 3 m are left, with p = 0.616.
         assert_eq!((grid.counts, grid.points.len()), ([9, 5], 45));
@@ -95,7 +97,42 @@ fn floors_are_found_however_the_house_is_turned() {
         assert!(points[0].distance(first) < 1e-13, "{}", points[0]);
         assert!((points[1] - points[0]).normalize().x > 0.8);
     }
-    assert_eq!(grids[1].name, "q11");
+    assert_eq!(grids[1].name, "q15");
+}
+
+/// A slab under two rooms and a cupboard, with a door between the rooms: a grid for each room, as
+/// if it had a floor of its own. So with a beam below the ceiling, which parts nothing.
+#[test]
+fn a_slab_under_two_rooms_is_two_grids() {
+    // A wall at x = 4 of 0.1 m, with a door of 2.1 m from y = 1 to 2.
+    let mut parts = walls([0.0; 3], [10.0, 4.0, 2.8]).to_vec();
+    for (y, z) in [([0.0, 1.0], [0.0, 2.8]), ([2.0, 4.0], [0.0, 2.8]), ([1.0, 2.0], [2.1, 2.8])] {
+        let at = |x: f64| [[x, y[0], z[0]], [x, y[1], z[0]], [x, y[1], z[1]], [x, y[0], z[1]]];
+        parts.extend([at(4.1), {
+            let [a, b, c, d] = at(4.0);
+            [d, c, b, a]
+        }]);
+    }
+    parts.extend(standing_block([8.0, 9.0], [3.4, 4.0], 0.0, 2.4));
+    let beam = [[7.0, 0.0, 2.5], [7.0, 4.0, 2.5], [7.0, 4.0, 2.8], [7.0, 0.0, 2.8]];
+    for parts in [parts.clone(), [parts, vec![beam]].concat()] {
+        let scene = scene(&parts);
+        let grids = floors(&scene, &GridSettings { spacing: Some(0.5), ..METRES });
+        let [a, b] = &grids[..] else { panic!("two rooms: {grids:?}") };
+        assert!(a.name.ends_with(" 1") && b.name.ends_with(" 2") && a.name != b.name);
+        for (grid, x, counts) in [(a, [0.5, 3.5], [7, 7]), (b, [4.6, 9.5], [11, 7])] {
+            assert_eq!(grid.counts, counts, "{grid:?}");
+            let [low, high] =
+                [grid.plane.origin, grid.plane.origin + grid.plane.edges[0]].map(|p| p.x);
+            // Distances to walls are those of rays, to a billionth of the scene's size.
+            assert!((low - x[0]).abs() < 1e-7 && (high - x[1]).abs() < 1e-7, "{grid:?}");
+        }
+        assert!(a.points.iter().all(Option::is_some));
+        // The strip goes around the cupboard: half a metre from x = 8 to 9 and y = 3.4 on.
+        let near = |p: &DVec3| p.x > 7.6 && p.x < 9.4 && p.y > 3.0;
+        assert!(!b.points.iter().flatten().any(near), "{b:?}");
+        assert!(b.points.iter().filter(|p| p.is_none()).count() < 20, "{b:?}");
+    }
 }
 
 /// An L: points keep off its inner corner too.

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use picture::{Picture, three_digits};
-use radiosity::camera::up_axis;
 use radiosity::glam::DVec3;
 use radiosity::grid::{
     GridPlane, GridSettings, GridStatistics, MeasuredGrid, MeasuringGrid, Quantity,
@@ -77,6 +76,7 @@ impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
         self.output.name(self.scene.with_extension(""), &["csv", "png"])?;
+        self.light.reading.needs_up = self.planes.is_empty();
         let scene = self.light.scene(&self.scene)?;
         // Before the bake, which may take minutes.
         let grids = self.grids(&scene)?;
@@ -98,7 +98,7 @@ impl Options {
 
     /// Where it is measured.
     fn grids(&self, scene: &Scene) -> Result<Vec<Placed>, Error> {
-        let up = self.light.reading.sky.up().unwrap_or_else(|| up_axis(scene));
+        let up = scene.up();
         let (task, floor) = (self.settings(0.0), self.settings(GridSettings::default().strip));
         if self.groups.is_empty() && self.planes.is_empty() {
             // That of desks, m.

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use radiosity::camera::up_axis;
 use radiosity::glam::DVec3;
 use radiosity::io::{Photometry, read_photometry};
 use radiosity::scene::Luminaire;
@@ -82,7 +81,7 @@ impl Luminaires {
         if self.is_empty() {
             return Ok(scene);
         }
-        let down = -up_axis(&scene);
+        let down = -scene.up();
         let metres = self.metres_per_unit;
         let luminaire = |(given, photometry): &(Given, Arc<Photometry>)| {
             let aim = given.aim.unwrap_or(down);
@@ -91,6 +90,11 @@ impl Luminaires {
             Luminaire { c0, scale, ..plain }
         };
         scene.with_luminaires(self.placed.iter().map(luminaire).collect())
+    }
+
+    /// The positions, and the aims that are given.
+    pub fn aims(&self) -> Vec<(DVec3, Option<DVec3>)> {
+        self.placed.iter().map(|(given, _)| (given.position, given.aim)).collect()
     }
 
     /// What was odd about the files.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use radiosity::io::SpecularSurfaces;
-use radiosity::scene::Sides;
+use radiosity::scene::{Sides, UpAxis};
 use radiosity::{Error, ObjSettings, Rgb, Scene};
 
 use crate::args::{Names, Parsed, give, one_of, rgb, value};
@@ -56,6 +56,9 @@ pub struct SceneOptions {
     /// Whether texture coordinates are kept where there is no texture.
     #[arg(skip)]
     pub texture_coordinates: bool,
+    /// Whether the command depends on which way is up.
+    #[arg(skip)]
+    pub needs_up: bool,
 }
 
 /// A scene as the options say.
@@ -75,7 +78,7 @@ impl SceneOptions {
     /// Those of [`ObjSettings::load`], [`SkyOptions::over`], [`Luminaires::read`] and
     /// [`Luminaires::over`].
     pub fn read(&self, path: &Path) -> Result<Input, Error> {
-        let (scene, luminaires) = progress::of_reading(path, || {
+        let (scene, up, luminaires) = progress::of_reading(path, || {
             let luminaires = self.luminaires.read()?;
             let mut obj = ObjSettings::default();
             obj.strict = self.strict;
@@ -89,10 +92,21 @@ impl SceneOptions {
             if !luminaires.is_empty() {
                 obj.sky.get_or_insert_default();
             }
-            let scene = luminaires.over(self.sky.over(obj.load(path)?)?)?;
-            Ok::<_, Error>((scene.resolve_sides(), luminaires))
+            let scene = obj.load(path)?;
+            let up = match self.sky.up() {
+                Some(axis) => UpAxis::given(axis),
+                None => UpAxis::of(&scene, &luminaires.aims()),
+            };
+            let scene = luminaires.over(self.sky.over(scene.with_up(up.axis))?)?;
+            Ok::<_, Error>((scene.resolve_sides(), up, luminaires))
         })?;
         let mut warnings = luminaires.warnings();
+        let aimless = luminaires.aims().iter().any(|(_, aim)| aim.is_none());
+        let needs_up = self.needs_up || self.sky.needs_up() || aimless;
+        if needs_up {
+            eprintln!("up: {up}");
+            warnings.extend(up.warning());
+        }
         warnings.extend(self.sky.warning(&scene));
         warnings.extend(scene.warnings().iter().map(ToString::to_string));
         warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));

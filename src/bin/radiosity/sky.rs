@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use radiosity::camera::up_axis;
 use radiosity::glam::{DQuat, DVec3};
 use radiosity::io::read_radiance;
 use radiosity::scene::SkyDistribution;
@@ -33,7 +32,7 @@ pub struct SkyOptions {
     /// The same by degrees north and east and a time, as 48.1,11.6,2026-06-21T12:00:00+02:00=800
     #[arg(long, value_name = "LAT,LON,TIME=E", overrides_with = "sun", value_parser = sun_at)]
     sun_at: Option<GivenSun>,
-    /// Direction away from the ground [default: +y or +z, whichever the scene suggests]
+    /// Direction away from the ground [default: +y or +z, by names, comments, lamps and geometry]
     #[arg(long, value_name = "x,y,z", value_parser = direction)]
     up: Option<DVec3>,
     /// Direction of north, for --sun-at [default: -z; +y where +z is up]
@@ -65,6 +64,12 @@ impl SkyOptions {
     /// Which way is up, if that was said.
     pub fn up(&self) -> Option<DVec3> {
         self.up
+    }
+
+    /// Whether the light depends on which way is up.
+    pub fn needs_up(&self) -> bool {
+        !matches!(self.kind, None | Some(Kind::Uniform(_)))
+            || matches!(self.given_sun(), Some((SunPlace::At(..), _)))
     }
 
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
@@ -103,7 +108,7 @@ impl SkyOptions {
         if is_even && self.given_sun().is_none() {
             return Ok(scene);
         }
-        let up = self.up.unwrap_or_else(|| up_axis(&scene));
+        let up = scene.up();
         let sun = self.sun(up)?;
         let towards_sun = sun.map_or(up, |sun| sun.direction);
         let zenith = self.zenith.unwrap_or(Rgb::ONE);
@@ -140,7 +145,7 @@ impl SkyOptions {
         else {
             return None;
         };
-        let up = self.up.unwrap_or_else(|| up_axis(scene));
+        let up = scene.up();
         let list = |v: DVec3| v.to_array().map(|x| (x + 0.0).to_string()).join(",");
         (sun.direction.dot(up) < 0.0).then(|| {
             format!(
@@ -204,7 +209,7 @@ impl SkyOptions {
         let mut words = vec![self.kind.as_ref().map_or_else(|| "none".into(), Kind::words)];
         if !matches!(self.kind, None | Some(Kind::Uniform(_))) {
             words.push(format!("--zenith {}", list(self.zenith.unwrap_or(Rgb::ONE))));
-            words.push(format!("--up {}", list(self.up.unwrap_or_else(|| up_axis(scene)))));
+            words.push(format!("--up {}", list(scene.up())));
         }
         if let Some(Sun { direction, irradiance }) = scene.sky().sun() {
             words.push(format!("--sun {}={}", list(*direction), list(*irradiance)));

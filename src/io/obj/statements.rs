@@ -76,6 +76,8 @@ impl Names {
 #[derive(Default)]
 pub(super) struct Statements {
     pub faces: Vec<FaceNote>,
+    /// Comments before the first face, without `#`, the first of them.
+    pub comments: Vec<String>,
     pub material_uses: Vec<MaterialUse>,
     /// Numbers of the vertices from 0, in the order of tobj's models: by first use in each.
     pub vertex_order: Vec<u32>,
@@ -102,6 +104,15 @@ pub(super) struct Statements {
 }
 
 impl Statements {
+    fn comment(&mut self, line: &Line) {
+        // Programs name themselves in the first lines.
+        let (most_lines, most_characters) = (32, 200);
+        if self.faces.is_empty() && self.comments.len() < most_lines {
+            let text = line.text.trim_start_matches('#').trim();
+            self.comments.push(text.chars().take(most_characters).collect());
+        }
+    }
+
     /// Processes `line`, which comes after those that load the `library` so far, and appends its
     /// replacement for tobj to `out`.
     pub fn line(
@@ -133,7 +144,7 @@ impl Statements {
             | "trim" | "hole" | "scrv" | "sp" | "end" | "con" => {
                 passed_over(repairs, WarningKind::FreeForm)?;
             }
-            comment if comment.starts_with('#') => {}
+            comment if comment.starts_with('#') => self.comment(line),
             _ => passed_over(repairs, WarningKind::UnknownStatement)?,
         }
         Ok(())
