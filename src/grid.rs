@@ -29,6 +29,7 @@ use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, PointIrradiance, irradiance_at};
+use crate::path_correction::{PathCorrection, correct_by_paths};
 use crate::scene::{Rgb, Scene};
 pub use measuring_grid::MeasuringGrid;
 pub use plane::GridPlane;
@@ -44,6 +45,8 @@ pub struct MeasuredGrid {
     pub grid: MeasuringGrid,
     /// Irradiance, in the order of [`MeasuringGrid::points`]; `None` where there is no point.
     pub values: Vec<Option<PointIrradiance>>,
+    /// The part of standard errors that all values have in common, W/m² per channel.
+    pub common_error: Rgb,
 }
 
 impl MeasuringGrid {
@@ -125,20 +128,47 @@ impl MeasuringGrid {
         gatherer: &mut dyn Gather,
         progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<MeasuredGrid>, Error> {
-        let (scene, normal) = (light.mesh.scene(), self.plane.normal()?);
-        let [a, b] = self.cell();
-        let above = |&p: &DVec3| GatherPoint::above(scene, p, normal, a.min(b));
-        let points: Vec<GatherPoint> = self.points.iter().flatten().map(above).collect();
+        let points = self.gather_points(light.mesh.scene())?;
         let Some(found) = irradiance_at(light, &points, gatherer, progress)? else {
             return Ok(None);
         };
         let mut found = found.into_iter();
         let values = self.points.iter().map(|p| p.and_then(|_| found.next())).collect();
-        Ok(Some(MeasuredGrid { grid: self.clone(), values }))
+        Ok(Some(MeasuredGrid { grid: self.clone(), values, common_error: Rgb::ZERO }))
+    }
+
+    /// The points as they gather.
+    fn gather_points(&self, scene: &Scene) -> Result<Vec<GatherPoint>, Error> {
+        let normal = self.plane.normal()?;
+        let [a, b] = self.cell();
+        let above = |&p: &DVec3| GatherPoint::above(scene, p, normal, a.min(b));
+        Ok(self.points.iter().flatten().map(above).collect())
     }
 }
 
 impl MeasuredGrid {
+    /// Corrects the values, which are those of `light`, by paths until 95 % of them are estimated to
+    /// be off by less than the share `error`: see [`correct_by_paths`] for `progress` and `None`.
+    /// Standard errors are those against the true light then.
+    ///
+    /// # Errors
+    /// Those of [`correct_by_paths`].
+    pub fn correct(
+        &mut self,
+        light: &GatheredMesh,
+        error: f64,
+        progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<PathCorrection>, Error> {
+        let points = self.grid.gather_points(light.mesh.scene())?;
+        let mut values: Vec<PointIrradiance> = self.values.iter().flatten().copied().collect();
+        let correction = correct_by_paths(light, &points, &mut values, error, progress)?;
+        if let Some(correction) = &correction {
+            self.values.iter_mut().flatten().zip(values).for_each(|(old, new)| *old = new);
+            self.common_error = correction.common_error;
+        }
+        Ok(correction)
+    }
+
     /// Values of `quantity` at the points outside of solids, in their order, with standard errors.
     pub fn measured(&self, quantity: Quantity) -> impl Iterator<Item = Option<[f64; 2]>> {
         self.values.iter().map(move |value| {
@@ -149,6 +179,6 @@ impl MeasuredGrid {
 
     /// Statistics of `quantity`; `None` if no point is outside of solids.
     pub fn statistics(&self, quantity: Quantity) -> Option<GridStatistics> {
-        GridStatistics::of(self.measured(quantity).flatten())
+        GridStatistics::of(self.measured(quantity).flatten(), quantity.of(self.common_error))
     }
 }

@@ -57,6 +57,7 @@
 //! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
 //! | [`grid`], [`probe`] | light on measuring grids; spherical harmonics at points in the air |
+//! | [`path_correction`] | values at points corrected by paths, with their errors |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
 //! | [`bands`] | light in any number of bands on the mesh of a bake; spectra to colours |
@@ -119,6 +120,7 @@ mod light;
 pub mod light_map;
 mod linear;
 pub mod mesh;
+pub mod path_correction;
 pub mod probe;
 mod progress;
 pub mod ranks;

@@ -382,9 +382,10 @@ impl Scene {
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
         let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
-        let crease_degrees = self.crease_degrees;
+        let (crease_degrees, up) = (self.crease_degrees, self.up);
         let (sky, luminaires) = (self.sky.clone(), self.luminaires.clone());
-        let scene = Scene { sky, luminaires, textures, cut_sides, crease_degrees, ..scene };
+        let scene = Scene { up, sky, luminaires, textures, cut_sides, crease_degrees, ..scene };
+        let scene = scene.with_comments(self.comments.to_vec());
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));

@@ -26,7 +26,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy error form_factor geometry linear mesh progress sampling scene vertex \
          visibility",
     ),
-    ("grid", "error gather geometry scene visibility"),
+    ("path_correction", "error gather light progress sampling scene visibility"),
+    ("grid", "error gather geometry path_correction scene visibility"),
     ("probe", "error gather progress scene visibility"),
     ("view_factor", "error form_factor geometry ranks sampling scene visibility"),
     ("heat", "error geometry linear view_factor"),

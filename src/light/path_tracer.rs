@@ -217,6 +217,27 @@ impl<'a> PathTracer<'a> {
         (reflected, None)
     }
 
+    /// What the surfaces seen from `position`, with this unit `normal`, reflect to it beyond what
+    /// is `known` of them: irradiance by one path, W/m², unbiased. Light that they emit is not in
+    /// it, nor is what is nearer than `near`.
+    pub(crate) fn missed(
+        &self,
+        position: DVec3,
+        normal: DVec3,
+        near: f64,
+        known: impl Fn(&Hit) -> Rgb,
+        rng: &mut Rng,
+    ) -> Rgb {
+        let (direction, _) = cosine_weighted(normal, rng);
+        let hit = self.first_hit(position, direction, near, None);
+        let Some(hit) = hit.filter(|hit| hit.front) else { return Rgb::ZERO };
+        let passed =
+            self.panes.transmittance(position, direction, near..hit.distance - self.contact);
+        let at = position + hit.distance * direction;
+        let (reflected, _) = self.path_to(&hit, at, true, |_| false, rng);
+        passed * (reflected - known(&hit))
+    }
+
     /// Takes a path one surface further from `at`: adds the light that arrives at `at` to what is
     /// `reflected`, W/m², moves `at` to the next hit, and multiplies `throughput` by what panes on
     /// the way let through. None where the path leaves or meets a back.
@@ -403,14 +424,24 @@ impl<'a> PathTracer<'a> {
     /// What a ray along `direction` (unit length) meets first. What lies in one place with the
     /// surface it starts from is passed.
     fn next_hit(&self, at: &SurfacePoint, direction: DVec3) -> Option<Hit> {
-        let from =
-            |start, ignored| self.rays.closest_hit(at.position, direction, start, Some(ignored));
-        let hit = from(self.contact, at.triangle)?;
+        self.first_hit(at.position, direction, self.contact, Some(at.triangle))
+    }
+
+    /// The same from anywhere, further than `start`, not on triangle `ignored`.
+    fn first_hit(
+        &self,
+        from: DVec3,
+        direction: DVec3,
+        start: f64,
+        ignored: Option<usize>,
+    ) -> Option<Hit> {
+        let hit = self.rays.closest_hit(from, direction, start, ignored)?;
         if hit.front {
             return Some(hit);
         }
         // Of two faces back to back in one place the front is met.
-        let twin = from((hit.distance - self.contact).max(self.contact), hit.triangle);
+        let behind = (hit.distance - self.contact).max(start);
+        let twin = self.rays.closest_hit(from, direction, behind, Some(hit.triangle));
         let same_place = |twin: &Hit| twin.front && twin.distance < hit.distance + self.contact;
         Some(twin.filter(same_place).unwrap_or(hit))
     }

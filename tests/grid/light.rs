@@ -6,9 +6,9 @@ use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::GatheredMesh;
 use radiosity::grid::{GridPlane, GridSettings, MeasuredGrid, MeasuringGrid, Quantity};
-use radiosity::{Backend, Mesh, Rgb, Scene};
+use radiosity::{Backend, Material, Mesh, Rgb, Scene};
 
-use crate::common::scenes::{block, facing_down, facing_up, grey, lamp};
+use crate::common::scenes::{block, facing_down, facing_up, grey, lamp, walls};
 use crate::common::{keep_counting, quads};
 
 const METRES: GridSettings = GridSettings { metre: 1.0, strip: 0.0, spacing: None };
@@ -78,4 +78,44 @@ fn points_in_solids_do_not_count() {
     let count = found.grid.points.iter().flatten().filter(outside).count();
     assert!(count > 10 && statistics.points == count, "{statistics:?}");
     assert!(statistics.minimum > 0.0);
+}
+
+/// A cube whose walls emit 1 and reflect half: irradiance is 2 everywhere. The light that is given
+/// lacks a fifth of what is reflected, and up to three times as much at one end: paths bring values
+/// to 2, and errors are as large as stated.
+#[test]
+fn paths_correct_light_that_is_wrong() {
+    let shiny = Material { exitance: Rgb::ONE, ..Material::grey("shiny", 0.5) };
+    let scene = quads(&walls([0.0; 3], [1.0; 3]).map(|wall| (wall, shiny.clone())));
+    let mesh = Mesh::new(scene, 0.2).unwrap();
+    let plane =
+        GridPlane { origin: DVec3::new(0.1, 0.1, 0.4), edges: [DVec3::X * 0.8, DVec3::Y * 0.8] };
+    let settings = GridSettings { spacing: Some(0.09), ..METRES };
+    let grid = MeasuringGrid::on_plane("plane", plane, &settings).unwrap();
+    for (slope, error) in [(0.0, 0.05), (0.4, 0.05), (0.4, 0.02)] {
+        let reflected = |e: usize| 0.8 - slope * mesh.centroid(mesh.element(e)).x;
+        let radiosity: Vec<Rgb> =
+            (0..mesh.element_count()).map(|e| Rgb::splat(1.0 + reflected(e))).collect();
+        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        let mut gatherer = Backend::Cpu.gather_to_noise(&light, 0.01).unwrap();
+        let mut found = grid.measure(&light, &mut *gatherer, keep_counting).unwrap().unwrap();
+        let before = found.statistics(Quantity::Irradiance).unwrap();
+        assert!((before.mean - 2.0 + 0.2 + slope / 2.0).abs() < 0.05, "{before:?}");
+        let correction = found.correct(&light, error, keep_counting).unwrap().unwrap();
+        assert!(correction.is_reached && correction.correction > 0.05, "{correction:?}");
+        let (mut squares, mut stated, mut within) = (0.0, 0.0, 0);
+        for [value, deviation] in found.measured(Quantity::Irradiance).flatten() {
+            squares += (value - 2.0).powi(2);
+            stated += deviation * deviation;
+            within += usize::from((value - 2.0).abs() <= error * 2.0);
+            assert!(deviation <= 0.5 * error * 2.0 && (value - 2.0).abs() < 5.0 * deviation);
+        }
+        // Stated a little too large, by the uncertainty of the spread.
+        let ratio = (squares / stated).sqrt();
+        assert!(ratio > 0.3 && ratio < 1.2, "{slope} {error}: {ratio}");
+        assert!(within as f64 >= 0.95 * grid.points.len() as f64, "{within}");
+        let after = found.statistics(Quantity::Irradiance).unwrap();
+        assert!((after.mean - 2.0).abs() < 4.0 * after.mean_error, "{after:?}");
+        assert!(after.mean_error < 0.3 * error * 2.0, "{after:?}");
+    }
 }

@@ -22,6 +22,8 @@ pub enum Stop {
     Reported,
     /// Ctrl-C stopped the work; what there was has been written.
     Interrupted,
+    /// Results are written, and their error is larger than what was asked for.
+    Missed,
 }
 
 impl Stop {
@@ -39,6 +41,7 @@ impl Stop {
             }
             Stop::Reported => ExitCode::FAILURE,
             Stop::Interrupted => ExitCode::from(interrupt::EXIT_STATUS),
+            Stop::Missed => ExitCode::from(3),
         }
     }
 }
@@ -128,6 +131,12 @@ pub fn names<T>(all: Names<T>) -> Vec<&'static str> {
 /// How a command ends whose results are written.
 pub fn end() -> Result<(), Stop> {
     if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(()) }
+}
+
+/// The same for results that were to have an error.
+pub fn end_at(is_reached: bool) -> Result<(), Stop> {
+    end()?;
+    if is_reached { Ok(()) } else { Err(Stop::Missed) }
 }
 
 /// `r,g,b`, or one number for all three.

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use files::Files;
+use radiosity::bake::Outcome;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky};
 use settings::Adjustment;
 
@@ -94,13 +95,16 @@ impl Bake {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
         match self.scene.take() {
-            Some(scene) if !self.list_settings => say!("{}", self.bake_file(&scene)?.table()),
+            Some(scene) if !self.list_settings => {
+                let report = self.bake_file(&scene)?;
+                say!("{}", report.table());
+                args::end_at(!matches!(report.baked.outcome, Outcome::Missed(_)))
+            }
             _ => {
                 settings::print();
-                return Ok(());
+                Ok(())
             }
         }
-        args::end()
     }
 
     /// How far to go.

@@ -81,10 +81,12 @@ impl Options {
         // Before the bake, which may take minutes.
         let grids = self.grids(&scene)?;
         let light = self.light.bake(scene)?;
-        let measured = self.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
+        let mut measured = self.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
+        let is_reached = self.correct(&mut measured, &light)?.ok_or(Stop::Interrupted)?;
         self.write(&grids, &measured)?;
         progress::print_written();
-        args::end()
+        self.light.print_outcome(is_reached);
+        args::end_at(is_reached)
     }
 
     fn quantity(&self) -> Quantity {
@@ -134,6 +136,22 @@ impl Options {
             let measured: Option<Result<Vec<MeasuredGrid>, Error>> =
                 grids.iter().map(measure).collect();
             measured.transpose()
+        })
+    }
+
+    /// Corrects the values by paths, to the error that was asked for; whether that is reached, none
+    /// where Ctrl-C stopped it.
+    fn correct(&self, measured: &mut [MeasuredGrid], light: &Light) -> Result<Option<bool>, Error> {
+        let lit = &light.baked.light;
+        progress::of_stoppable("paths", |report| {
+            let mut is_reached = true;
+            for grid in measured.iter_mut() {
+                let Some(correction) = grid.correct(lit, self.light.error(), &mut *report)? else {
+                    return Ok(None);
+                };
+                is_reached &= correction.is_reached;
+            }
+            Ok(Some(is_reached))
         })
     }
 

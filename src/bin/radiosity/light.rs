@@ -12,7 +12,7 @@ use crate::{interrupt, progress};
 /// The light, and how exact what is measured in it is to be.
 #[derive(Args)]
 pub struct LightOptions {
-    /// Error of the measurement, root mean square, as a share
+    /// Error of values, as a share: 95 % of them are off by less
     #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = value::<f64>(SHARE))]
     error: f64,
     #[command(flatten)]
@@ -35,7 +35,17 @@ impl LightOptions {
 
     /// The noise that what is measured may have, as a share of it.
     pub fn noise(&self) -> f64 {
-        (0.5 * self.error).min(1.0)
+        (0.25 * self.error).min(1.0)
+    }
+
+    /// Says whether the error that was asked for is reached.
+    pub fn print_outcome(&self, is_reached: bool) {
+        // In the digits that it was asked in.
+        let asked = (100.0 * self.error) as f32;
+        match is_reached {
+            true => say!("{asked} % reached at 95 % of the points"),
+            false => say!("{asked} % missed: some points are off by more; their errors say which"),
+        }
     }
 
     /// The scene of an OBJ file. Prints warnings.
