@@ -87,6 +87,8 @@ pub struct Scene {
     /// See [`Scene::coordinate_ulp`].
     coordinate_ulp: f64,
     warnings: Vec<Warning>,
+    /// Which way is up, if that was said.
+    up: Option<DVec3>,
     /// See [`Scene::sky`].
     sky: Sky,
     /// See [`Scene::luminaires`].
@@ -171,6 +173,7 @@ impl Scene {
             degenerate,
             coordinate_ulp: f64::EPSILON * largest,
             warnings: vec![],
+            up: None,
             sky: Sky::default(),
             luminaires: Arc::default(),
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
@@ -264,11 +267,17 @@ impl Scene {
         self.covered_backs().is_covered(t)
     }
 
+    /// Triangles whose fronts coincide with the back of triangle `t` and cover all of it; none if
+    /// some of it is open.
+    pub(crate) fn back_covers(&self, t: usize) -> &[u32] {
+        self.covered_backs().of(t)
+    }
+
     /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back, from which
     /// its transmitted light leaves. None for others.
     pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {
         let is_translucent = |t: usize| self.material(t).is_translucent();
-        let covers = if is_translucent(t) { self.covered_backs().of(t) } else { &[] };
+        let covers = if is_translucent(t) { self.back_covers(t) } else { &[] };
         covers.iter().map(|&s| s as usize).filter(move |&s| is_translucent(s))
     }
 
@@ -374,9 +383,9 @@ impl Scene {
         let (groups, materials) = (self.groups.clone(), self.materials.clone());
         let scene = Scene::new(positions, triangles, groups, materials)?;
         let (textures, cut_sides) = (self.textures.clone(), self.cut_sides.clone());
-        let crease_degrees = self.crease_degrees;
+        let (crease_degrees, up) = (self.crease_degrees, self.up);
         let (sky, luminaires) = (self.sky.clone(), self.luminaires.clone());
-        let scene = Scene { sky, luminaires, textures, cut_sides, crease_degrees, ..scene };
+        let scene = Scene { up, sky, luminaires, textures, cut_sides, crease_degrees, ..scene };
         if scene.degenerate > 0 {
             let found = format!("{} triangles without area when moved", scene.degenerate);
             return Err(bad(format!("group '{group}'"), found, "scale it by less"));
@@ -399,6 +408,18 @@ impl Scene {
     /// smooth surfaces and other data that this module does not define.
     pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
         self.derived.get(|| make(self))
+    }
+
+    /// The same scene with this direction up, of any length but 0, for views and files: otherwise
+    /// [`up_axis`](crate::camera::up_axis) finds it.
+    #[must_use]
+    pub fn with_up(self, up: DVec3) -> Scene {
+        Scene { up: up.try_normalize(), ..self }
+    }
+
+    /// Which way is up, if that was said; unit length.
+    pub(crate) fn given_up(&self) -> Option<DVec3> {
+        self.up
     }
 
     pub(crate) fn warn(&mut self, warning: Warning) {

@@ -15,10 +15,13 @@ use glam::DVec3;
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
-/// The axis, +y or +z, that most likely points up in `scene`: by level and upright area, by objects
-/// that are wider below than above, and by which way ground, roofs and lamps face. +y without clear
-/// evidence.
+/// The direction up of `scene` ([`Scene::with_up`]). Where it was not said, the axis, +y or +z, that
+/// most likely points up: by level and upright area, by objects that are wider below than above,
+/// and by which way ground, roofs and lamps face. +y without clear evidence.
 pub fn up_axis(scene: &Scene) -> DVec3 {
+    if let Some(given) = scene.given_up() {
+        return given;
+    }
     if evidence(scene, DVec3::Z) > evidence(scene, DVec3::Y) + 0.05 { DVec3::Z } else { DVec3::Y }
 }
 

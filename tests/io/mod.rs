@@ -1,3 +1,5 @@
+#[cfg(feature = "textures")]
+mod blender;
 mod glb;
 mod image;
 #[cfg(feature = "textures")]
