@@ -50,10 +50,10 @@ use crate::error::{Error, ErrorKind};
 pub use self::exr::write_exr;
 #[cfg(all(feature = "exr", feature = "light-map"))]
 pub use self::exr::{write_light_map_exr, write_light_map_radiosity};
-#[cfg(feature = "glb")]
-pub use self::glb::write_glb;
 #[cfg(all(feature = "glb", feature = "light-map"))]
 pub use self::glb::write_light_map_glb;
+#[cfg(feature = "glb")]
+pub use self::glb::{GlbSettings, write_glb};
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
 #[cfg(feature = "npz")]

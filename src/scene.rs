@@ -272,11 +272,17 @@ impl Scene {
         self.covered_backs().is_covered(t)
     }
 
+    /// Triangles whose fronts coincide with the back of triangle `t` and cover all of it; none if
+    /// some of it is open.
+    pub(crate) fn back_covers(&self, t: usize) -> &[u32] {
+        self.covered_backs().of(t)
+    }
+
     /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back, from which
     /// its transmitted light leaves. None for others.
     pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {
         let is_translucent = |t: usize| self.material(t).is_translucent();
-        let covers = if is_translucent(t) { self.covered_backs().of(t) } else { &[] };
+        let covers = if is_translucent(t) { self.back_covers(t) } else { &[] };
         covers.iter().map(|&s| s as usize).filter(move |&s| is_translucent(s))
     }
 

@@ -22,8 +22,8 @@ impl Camera {
     /// Chooses a view of what is lit in `light`, for a picture of this width over height: from
     /// inside where that is a room, from outside where it is an object or a room that lacks a wall.
     ///
-    /// Of four sides it is the one that most of the reflected light leaves to. +y or +z is up,
-    /// whichever is more likely for the scene. The same light gives the same view.
+    /// Of four sides it is the one that most of the reflected light leaves to. [`Scene::up`](crate::Scene::up) is up.
+    /// The same light gives the same view.
     pub fn framing(light: &GatheredMesh, aspect: f64) -> Camera {
         let scene = light.mesh.scene();
         let (bounds, flux) = lit_box(light);
@@ -55,7 +55,9 @@ impl Framing<'_> {
     /// The unit direction of a view from this elevation in degrees, at an azimuth in turns.
     fn forward(&self, elevation: f64, turns: f64) -> DVec3 {
         // The first direction is −z where +y is up, and +y where +z is up.
-        let first = if self.up == DVec3::Y { DVec3::NEG_Z } else { DVec3::Y };
+        let across = |axis: &DVec3| axis.dot(self.up).abs() < 0.8;
+        let first = [DVec3::NEG_Z, DVec3::Y].into_iter().find(across).unwrap_or(DVec3::X);
+        let first = first.reject_from_normalized(self.up).normalize();
         let (sine, cosine) = (turns * TAU).sin_cos();
         let (down, level) = elevation.to_radians().sin_cos();
         (first * cosine + first.cross(self.up) * sine) * level - self.up * down

@@ -1,4 +1,4 @@
-//! OpenEXR output: linear light, one 32-bit float per channel.
+//! OpenEXR output: linear light, one 32-bit float per channel, in scan lines (ZIP).
 
 use std::path::Path;
 
@@ -75,7 +75,9 @@ fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Resu
     let channel = |(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples));
     let channels = AnyChannels::sort(channels.into_iter().map(channel).collect());
     let size = (width as usize, height as usize);
-    let image = Image::from_encoded_channels(size, Encoding::FAST_LOSSLESS, channels);
+    // Blocks of 16 scan lines, ZIP, as most programs write: some engines do not read tiles
+    // (Babylon.js 9.35, three.js up to r160).
+    let image = Image::from_encoded_channels(size, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(vec![]);
     // One block after the other: parallel writes would change their order from run to run.
     image.write().non_parallel().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;

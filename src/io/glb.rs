@@ -13,36 +13,42 @@ mod file;
 mod images;
 #[cfg(feature = "light-map")]
 mod light_map;
+mod materials;
 mod primitives;
+mod settings;
+mod two_sides;
 
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use gltf_json::material::{AlphaCutoff, AlphaMode, PbrBaseColorFactor, PbrMetallicRoughness};
 use gltf_json::mesh::Semantic;
-use gltf_json::texture::{Info, MinFilter};
+use gltf_json::texture::MinFilter;
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Index, Material, Value};
+use gltf_json::{Index, Material, Texture, Value};
+use image::ImageResult;
+use rustc_hash::FxHashMap;
 
 use super::cannot_write;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
-use crate::io::tone::ToneCurve;
 use crate::scene::Rgb;
-use file::{Attributes, GlbFile, unlit};
-use images::{Images, irradiance, mean_radiosity};
+use file::{Attributes, GlbFile};
+use images::{Images, mean_radiosity};
 #[cfg(feature = "light-map")]
 pub use light_map::write_light_map_glb;
+use materials::{Look, unlit};
 use primitives::{Primitive, primitives};
+pub use settings::GlbSettings;
+use two_sides::TwoSides;
 
 /// Writes `light` as glTF 2.0 binary, `.glb`: the same bytes for the same light.
 ///
 /// A node for each group and a primitive for each of its materials, by their names. Vertices have
-/// `POSITION`, `NORMAL`, `COLOR_0` (linear, through `tone`, a curve of radiosity, within [0, 1])
-/// and `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
+/// `POSITION`, `NORMAL`, `COLOR_0` (linear, through a tone curve of radiosity, within [0, 1]) and
+/// `_RADIOSITY` (W/m² per channel, linear). Materials are white and unlit
 /// (`KHR_materials_unlit`), so that viewers show `COLOR_0` unchanged, and clear panes transmit the
 /// mean of their transmittance (`alphaMode` `BLEND`); their `extras` have reflectance and exitance.
 /// All numbers are 32-bit floats.
@@ -51,33 +57,37 @@ use primitives::{Primitive, primitives};
 /// `TEXCOORD_0`, after `-s` and `-o`, and `_IRRADIANCE` (W/m² per channel, linear), to be
 /// multiplied by a texture of reflectance; `_RADIOSITY` has its mean around each vertex. The file
 /// has an image for each material with `map_Ke`, else `map_Kd`, as its colour (PNG): the texture as
-/// `tone` shows it under the median light on that material. Viewers multiply it by `COLOR_0`, the
-/// ratio of the colour of the texture's mean under the light at a vertex to that under the median
-/// light.
+/// the curve shows it under the median light on that material. Viewers multiply it by `COLOR_0`,
+/// the ratio of the colour of the texture's mean under the light at a vertex to that under the
+/// median light.
 ///
-/// Lengths and axes are those of the scene's file, as the asset's `extras` say, although glTF has
-/// metres with +y up: nothing is turned or scaled. A scene more than 16 of its sizes from the
-/// origin is moved there, and its node moves it back.
+/// Lengths and axes of vertices are those of the scene, and the top node turns them to +Y up and
+/// scales them to metres, as glTF has them ([`Scene::up`], [`GlbSettings`]).
+/// A scene more than 16 of its sizes
+/// from the origin is moved there, and that node moves it back.
+///
+/// Of a surface that reflects on both sides each is a face whose back viewers leave out. So that
+/// ray tracers, which do not, do not meet both in one place, they lie 1e-4 of the scene's diagonal
+/// apart; where the light of both is the same within [`GlbSettings::error`], they are one face with
+/// a double-sided material.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
 pub fn write_glb(
     path: impl AsRef<Path>,
     light: &GatheredMesh,
-    tone: &ToneCurve,
+    settings: impl Into<GlbSettings>,
 ) -> Result<(), Error> {
-    let path = path.as_ref();
-    let origin = origin(Aabb::from_points(light.surface.positions.iter().copied()));
-    let primitives = primitives(light);
-    let images = Images::new(light, tone, &primitives);
-    let images = images.map_err(|e| cannot_write(path, io::Error::other(e)))?;
-    let model = Model { light, tone, images, origin };
+    let (path, settings) = (path.as_ref(), settings.into());
+    let model = Model::new(light, &settings);
+    let model = model.map_err(|e| cannot_write(path, io::Error::other(e)))?;
     let mut file = GlbFile::new(&model.notes());
     let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
-    for of_group in primitives.chunk_by(|a, b| a.group == b.group) {
+    for of_group in model.primitives.chunk_by(|a, b| a.group == b.group) {
         let mut parts = vec![];
         for primitive in of_group {
-            let key = (primitive.material, primitive.shown.is_some());
+            let Primitive { material, shown, is_double_sided, .. } = primitive;
+            let key = (*material, shown.is_some(), *is_double_sided);
             let material = || model.add_material(&mut file, primitive);
             let material = *materials.entry(key).or_insert_with(material);
             let attributes = model.add_attributes(&mut file, primitive);
@@ -89,7 +99,8 @@ pub fn write_glb(
     for png in model.images.into_files() {
         file.add_image(png, None);
     }
-    file.write(path, groups, origin)
+    let top = settings.top_node(light.mesh.scene(), model.origin.as_dvec3());
+    file.write(path, top, groups)
 }
 
 /// Origin of the positions written for a scene with these `bounds`, scene unit.
@@ -103,22 +114,36 @@ fn origin(bounds: Aabb) -> Vec3 {
 /// The file's content: the surface, split by groups and materials.
 struct Model<'a> {
     light: &'a GatheredMesh,
-    tone: &'a ToneCurve,
+    settings: &'a GlbSettings,
+    primitives: Vec<Primitive<'a>>,
     images: Images,
     /// The point that positions are relative to, scene unit.
     origin: Vec3,
+    /// By how much vertices are moved, scene unit.
+    shifts: FxHashMap<u32, DVec3>,
 }
 
-impl Model<'_> {
+impl<'a> Model<'a> {
+    fn new(light: &'a GatheredMesh, settings: &'a GlbSettings) -> ImageResult<Model<'a>> {
+        let sides = TwoSides::of_light(light, settings.error);
+        let primitives = primitives(light, &sides);
+        let textured = primitives.iter().filter_map(|primitive| {
+            let irradiances = primitive.vertices.iter().map(|&v| irradiance(light, v));
+            Some((primitive.material, primitive.shown?, irradiances.collect()))
+        });
+        let images = Images::new(light.mesh.scene().materials(), &settings.tone, textured)?;
+        let origin = origin(Aabb::from_points(light.surface.positions.iter().copied()));
+        let shifts = shifts(light, &sides);
+        Ok(Model { light, settings, primitives, images, origin, shifts })
+    }
+
     fn notes(&self) -> BTreeMap<&'static str, Value> {
         let images = "textures in the median light of a material; COLOR_0 is relative to that";
         BTreeMap::from([
-            ("axes", Value::from("those of the scene's file")),
-            ("unit", Value::from("that of the scene's file")),
             ("_RADIOSITY", Value::from("W/m2 per channel, linear BT.709")),
             ("COLOR_0", Value::from("_RADIOSITY times exposure, highlights rolled off")),
             ("images", Value::from(images)),
-            ("exposure", Value::from(self.tone.exposure())),
+            ("exposure", Value::from(self.settings.tone.exposure())),
         ])
     }
 
@@ -128,15 +153,19 @@ impl Model<'_> {
         let (surface, vertices) = (&self.light.surface, &primitive.vertices);
         let light = |b: Rgb| b.min(Rgb::splat(f64::from(f32::MAX))).as_vec3().to_array();
         let irradiance = |v: u32| irradiance(self.light, v);
+        let tone = &self.settings.tone;
         let image = primitive.shown.and_then(|_| self.images.get(primitive.material));
         let material = &self.light.mesh.scene().materials()[primitive.material as usize];
-        let position = |v: u32| (surface.positions[v as usize] - self.origin.as_dvec3()).as_vec3();
+        let position = |v: u32| {
+            let shift = self.shifts.get(&v).copied().unwrap_or_default();
+            (surface.positions[v as usize] + shift - self.origin.as_dvec3()).as_vec3()
+        };
         // glTF allows only length 1.
         let normal = |v: u32| surface.normals[v as usize].normalize_or(DVec3::Y).as_vec3();
         let colour = |v: u32| match image {
-            None => self.tone.linear(surface.radiosity[v as usize]).as_vec3(),
+            None => tone.linear(surface.radiosity[v as usize]).as_vec3(),
             Some(image) => {
-                let colour = self.tone.linear(mean_radiosity(material, irradiance(v)));
+                let colour = tone.linear(mean_radiosity(material, irradiance(v)));
                 image.vertex_colour(colour).as_vec3()
             }
         };
@@ -165,35 +194,39 @@ impl Model<'_> {
         all
     }
 
-    /// Adds an unlit material: the colour is in the vertices, and in the image if there is one.
     fn add_material(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Index<Material> {
         let material = &self.light.mesh.scene().materials()[primitive.material as usize];
-        // Clear panes are transparent in viewers.
-        let passed = material.clear_transmittance().map(|share| share.element_sum() / 3.0);
-        let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
-        let alpha_mode = match (passed, has_mask) {
-            (Some(_), _) => AlphaMode::Blend,
-            (None, true) => AlphaMode::Mask,
-            (None, false) => AlphaMode::Opaque,
+        let look = Look {
+            texture: self.add_texture(file, primitive).map(|index| (index, 0)),
+            has_mask: primitive.shown.is_some_and(|shown| shown.mask.is_some()),
+            is_double_sided: primitive.is_double_sided,
         };
-        let alpha = 1.0 - passed.unwrap_or(0.0) as f32;
-        let colour = PbrMetallicRoughness {
-            base_color_factor: PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]),
-            base_color_texture: self.add_texture(file, primitive),
-            ..Default::default()
-        };
-        file.add_material(Material {
-            alpha_mode: Valid(alpha_mode),
-            alpha_cutoff: (alpha_mode == AlphaMode::Mask).then_some(AlphaCutoff(0.5)),
-            ..unlit(material, colour)
-        })
+        file.add_material(unlit(material, look))
     }
 
     /// Adds the image of a primitive, repeated or not, smoothly filtered; none without a texture.
-    fn add_texture(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Option<Info> {
+    fn add_texture(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Option<Index<Texture>> {
         let clamped = primitive.shown?.frame()?.clamped;
         let source = Index::new(self.images.number(primitive.material)? as u32);
-        let index = file.add_texture(source, MinFilter::LinearMipmapLinear, clamped);
-        Some(Info { index, tex_coord: 0, extensions: None, extras: None })
+        Some(file.add_texture(source, MinFilter::LinearMipmapLinear, clamped))
     }
+}
+
+/// Irradiance of a vertex; 0 if unknown.
+fn irradiance(light: &GatheredMesh, vertex: u32) -> Rgb {
+    light.surface.irradiance.get(vertex as usize).copied().unwrap_or(Rgb::ZERO)
+}
+
+/// By how much the vertices of `light` are moved, scene unit; none of those that stay.
+fn shifts(light: &GatheredMesh, sides: &TwoSides) -> FxHashMap<u32, DVec3> {
+    let (surface, mesh) = (&light.surface, &light.mesh);
+    let mut shifts = FxHashMap::default();
+    for (face, &element) in surface.faces.iter().zip(&surface.elements) {
+        let t = mesh.triangle(mesh.element(element as usize));
+        for &v in face.iter().filter(|_| sides.is_moved(t)) {
+            let weights = mesh.scene().barycentric(t, surface.positions[v as usize]);
+            shifts.entry(v).or_insert_with(|| sides.shift(t, weights));
+        }
+    }
+    shifts
 }

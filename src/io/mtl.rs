@@ -7,6 +7,7 @@
 //! | `Ke` | emitted radiance L per channel: exitance π L |
 //! | `Ka` | radiance, if above 1 and no material has a `Ke`: see [`super::lights`] |
 //! | `illum`, `Ks`, `Ni`, `Tf`, `d`, `Tr` | mirrors and glass: see [`super::specular`] |
+//! | `Ns` | roughness of Blender's metals |
 //! | `d`, `Tr` of others | transparency: not modelled, warned about |
 //! | `map_Kd`, `map_Ke` | textures, multiplied by `Kd` and `Ke`: see [`super::textures`] |
 //! | `map_d` | a mask: holes where it is below a half |
@@ -21,7 +22,7 @@ use std::io::{self, Write as _};
 
 use super::files::{self, FileSource, MAX_BYTES};
 use super::obj::repairs::Repairs;
-use super::specular::{SpecularStatements, SpecularSurfaces};
+use super::specular::{MetalStatements, SpecularStatements, SpecularSurfaces};
 use super::text::{self, Line, finite, words};
 use crate::error::{Error, ErrorKind, quoted_few, shortened};
 use crate::scene::{Rgb, Specular, Warning, WarningKind};
@@ -52,6 +53,8 @@ pub(super) struct MtlMaterial {
     pub mask: Option<Box<str>>,
     /// `illum` and the statements that it uses.
     pub specular: Option<Specular>,
+    /// Whether Blender wrote it.
+    by_blender: bool,
     transparent: bool,
     /// Its `newmtl` line, and the file by index.
     line: u32,
@@ -173,19 +176,20 @@ impl Library {
             let done = format!("read as {encoding}");
             repairs.note_at(WarningKind::Encoding, || path.display().to_string(), "", done)?;
         }
+        let by_blender = text::is_by_blender(&text);
         let mut block = Block::default();
         for line in text::lines(&path, &text) {
             if line.keyword().0.eq_ignore_ascii_case("newmtl") {
-                self.push(std::mem::take(&mut block));
+                self.push(std::mem::take(&mut block), by_blender);
             }
             block.line(&line, repairs)?;
         }
-        self.push(block);
+        self.push(block, by_blender);
         Ok(())
     }
 
     /// Passes `block` to tobj, if it begins with a material.
-    fn push(&mut self, block: Block) {
+    fn push(&mut self, block: Block, by_blender: bool) {
         if block.line == 0 {
             return;
         }
@@ -196,12 +200,23 @@ impl Library {
                 self.redefined.insert(material.name.clone());
             }
             let file = self.files.len() as u32 - 1;
-            self.materials.push(MtlMaterial::new(material, block.line, file));
+            self.materials.push(MtlMaterial {
+                line: block.line,
+                file,
+                ..MtlMaterial::new(material, by_blender)
+            });
         }
     }
 
     /// Warns of statements of `used` materials that are not modelled, or only partly.
-    pub fn warn(&self, used: &HashSet<u32>, surfaces: SpecularSurfaces, repairs: &mut Repairs) {
+    /// `emit` are those that the caller lets emit.
+    pub fn warn(
+        &self,
+        used: &HashSet<u32>,
+        surfaces: SpecularSurfaces,
+        emit: &[(String, Rgb)],
+        repairs: &mut Repairs,
+    ) {
         let names = |odd: &dyn Fn(&MtlMaterial) -> bool| {
             let all = self.materials.iter().enumerate();
             let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
@@ -211,7 +226,22 @@ impl Library {
         let is_specular = |m: &MtlMaterial| m.specular.is_some();
         let shown = surfaces != SpecularSurfaces::Ignore;
         let is_opaque = |m: &MtlMaterial| m.transparent && !(shown && is_specular(m));
+        let is_metal = |m: &MtlMaterial| shown && m.is_metal();
+        let is_given = |name: &str| emit.iter().any(|(given, _)| given == name);
+        let lacks_strength = |m: &MtlMaterial| m.lacks_strength() && !is_given(&m.name);
         let lists = [
+            (
+                WarningKind::Metal,
+                names(&is_metal),
+                "`Kd` is all that it reflects: `Ka` (metallic) times the root of `Ns`/1000 \
+                 (1 - roughness) of that as a mirror, the rest diffusely",
+            ),
+            (
+                WarningKind::EmissionStrength,
+                names(&lacks_strength),
+                "its strength is 1, as Blender's exporter leaves it out: --emit MATERIAL=STRENGTH \
+                 multiplies the image",
+            ),
             (
                 WarningKind::Transparency,
                 names(&is_opaque),
@@ -273,14 +303,33 @@ impl MtlMaterial {
         self.textures.iter().chain([&self.mask]).any(Option::is_some)
     }
 
-    fn new(mut material: tobj::Material, line: u32, file: u32) -> MtlMaterial {
+    /// Whether it is a metal by Blender, part of whose `Kd` is a mirror.
+    pub fn is_metal(&self) -> bool {
+        self.by_blender && matches!(self.specular, Some(Specular::Mirror { .. }))
+    }
+
+    /// Whether Blender left out the strength of its emission, as it does beside a `map_Ke`.
+    fn lacks_strength(&self) -> bool {
+        let has_strength = self.radiance.is_some_and(|l| l != Rgb::ZERO);
+        self.by_blender && self.textures[1].is_some() && !has_strength
+    }
+
+    /// In no file yet.
+    fn new(mut material: tobj::Material, by_blender: bool) -> MtlMaterial {
         let emitted = material.unknown_param.remove("map_Ke");
         let text = |key: &str| material.unknown_param.get(key).map(String::as_str);
         let rgb = |colour: Option<[f64; 3]>| colour.map(Rgb::from_array);
         // Files differ in which end of `Tr` is opaque.
         let between = text("transparent").and_then(|t| t.parse().ok());
+        let model = material.illumination_model.unwrap_or(0);
+        let metal = (by_blender && model == 3).then(|| MetalStatements {
+            colour: rgb(material.diffuse).filter(|_| material.diffuse_texture.is_none()),
+            metallic: rgb(material.ambient),
+            shininess: material.shininess,
+        });
         let statements = SpecularStatements {
-            model: material.illumination_model.unwrap_or(0),
+            model,
+            metal,
             specular: rgb(material.specular),
             filter: text("Tf").and_then(colour),
             refractive_index: material.optical_density,
@@ -295,10 +344,11 @@ impl MtlMaterial {
             textures: [material.diffuse_texture, emitted]
                 .map(|name| name.map(String::into_boxed_str)),
             mask: material.dissolve_texture.map(String::into_boxed_str),
+            by_blender,
             transparent: material.dissolve.is_some_and(|d| d < 1.0) || between.is_some(),
             name: material.name,
-            line,
-            file,
+            line: 0,
+            file: 0,
         }
     }
 }
@@ -312,8 +362,10 @@ struct Block {
 }
 
 /// Statements passed on, spelled as here. Files differ in capitalisation.
-const STATEMENTS: [&str; 13] =
-    ["newmtl", "Kd", "Ke", "Ka", "Ks", "Tf", "Ni", "d", "Tr", "illum", "map_Kd", "map_Ke", "map_d"];
+const STATEMENTS: [&str; 14] = [
+    "newmtl", "Kd", "Ke", "Ka", "Ks", "Tf", "Ni", "Ns", "d", "Tr", "illum", "map_Kd", "map_Ke",
+    "map_d",
+];
 
 impl Block {
     fn line(&mut self, line: &Line, repairs: &mut Repairs) -> Result<(), Error> {
@@ -332,7 +384,9 @@ impl Block {
             "Kd" | "Ke" | "Ka" | "Ks" | "Tf" => {
                 colour(rest).map(|c| format!("{:e} {:e} {:e}", c.x, c.y, c.z))
             }
-            "d" | "Tr" | "Ni" => words(rest).last().and_then(finite).map(|x| format!("{x:e}")),
+            "d" | "Tr" | "Ni" | "Ns" => {
+                words(rest).last().and_then(finite).map(|x| format!("{x:e}"))
+            }
             "illum" => {
                 let model = words(rest).next().and_then(finite);
                 model.filter(|x| (0.0..256.0).contains(x)).map(|x| format!("{}", x as u8))
@@ -347,6 +401,8 @@ impl Block {
             }
             // Writing to a vector cannot fail.
             Some(values) => drop(writeln!(self.statements, "{known} {values}")),
+            // It counts for few materials.
+            None if *known == "Ns" => {}
             None => repairs.note(WarningKind::MaterialStatement, line, "", "passed over")?,
         }
         Ok(())

@@ -22,10 +22,15 @@ use super::mtl::Library;
 use super::stl;
 use super::text::{self, Line};
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Scene, WarningKind};
+use crate::scene::{Rgb, Scene, Sides, Warning, WarningKind};
 use repairs::Repairs;
 pub use settings::ObjSettings;
 use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
+
+/// What files by Blender lack, and how to give it.
+const NOT_EXPORTED: &str = "it leaves out lamps, the world, vertex colours and images that have no \
+    file of their own: give lamps as faces that emit, --luminaire or --sun, the world as --sky, \
+    and save images (Image > Save As) before the export";
 
 /// Loads a Wavefront OBJ file and the MTL files that it names.
 ///
@@ -98,6 +103,9 @@ fn read_scene(
         let done = format!("read as {encoding}");
         repairs.note_at(WarningKind::Encoding, || path.display().to_string(), "", done)?;
     }
+    if !stl::is_stl(path) && text::is_by_blender(&text) {
+        repairs.push(Warning::new(WarningKind::Generator, 1, NOT_EXPORTED));
+    }
     ObjFile::read(path, text, files, repairs)?.into_scene(settings)
 }
 
@@ -169,9 +177,17 @@ impl<'a> ObjFile<'a> {
         let models = std::mem::take(&mut self.models);
         let mut geometry = self.geometry(models, &named, settings.texture_coordinates)?;
         let used: HashSet<u32> = geometry.triangles.iter().map(|t| t.material).collect();
-        self.library.warn(&used, settings.specular, &mut self.repairs);
+        self.library.warn(&used, settings.specular, &settings.emit, &mut self.repairs);
         let mut materials = self.materials(&used, &geometry.triangles, settings)?;
         let textures = self.textures(&used, &mut materials, settings)?;
+        if settings.emit_both_sides {
+            for (k, material) in (0u32..).zip(&mut materials) {
+                let shows_light = textures.get(&k).is_some_and(|maps| maps.exitance.is_some());
+                if shows_light || material.exitance != Rgb::ZERO {
+                    material.sides = Sides::Emitting;
+                }
+            }
+        }
         if textures.is_empty() && !settings.texture_coordinates {
             geometry.texture_coordinates = vec![];
         }

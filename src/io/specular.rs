@@ -25,6 +25,14 @@
 //! ([`SpecularSurfaces::Clear`]) has none, whatever `Kd` is: in files it is the colour of a preview
 //! more often than a haze.
 
+//!
+//! Blender's exporter writes 3 for all opaque metals, with the metal's colour in `Kd`, `metallic`
+//! in `Ka`, 1000 (1 − roughness)² in `Ns`, and a `Ks` that has no effect on metals there. In files
+//! that begin with `# Blender` `Kd` is therefore all that such a metal reflects: `metallic` times
+//! 1 − roughness of it as a mirror, the rest diffusely, as there is no gloss here. Roughness 0 is a
+//! mirror and 1 is diffuse; what lies between is a plain choice. Metals with a `map_Kd` are
+//! diffuse, since mirrors have one colour.
+
 use crate::scene::{Rgb, Specular};
 
 /// Treatment of mirrors and glass in the light solution.
@@ -60,6 +68,7 @@ impl SpecularSurfaces {
 }
 
 /// Statements of a material about mirrors and glass, as written; none if unreadable.
+#[derive(Default)]
 pub(super) struct SpecularStatements {
     /// `illum`.
     pub model: u8,
@@ -73,13 +82,38 @@ pub(super) struct SpecularStatements {
     pub dissolve: Option<f64>,
     /// `Tr`, if it is between 0 and 1.
     pub transparency: Option<f64>,
+    /// `Kd`, `Ka` and `Ns` of a metal by Blender.
+    pub metal: Option<MetalStatements>,
+}
+
+/// Statements of a material of `illum` 3 by Blender, as written.
+pub(super) struct MetalStatements {
+    /// `Kd`; none beside a `map_Kd`.
+    pub colour: Option<Rgb>,
+    /// `Ka`.
+    pub metallic: Option<Rgb>,
+    /// `Ns`.
+    pub shininess: Option<f64>,
+}
+
+impl MetalStatements {
+    /// What it reflects as a mirror, per channel.
+    fn reflectance(&self) -> Rgb {
+        let metallic = self.metallic.map_or(1.0, |share| share.element_sum() / 3.0);
+        let smoothness = self.shininess.map_or(1.0, |ns| (ns.max(0.0) / 1000.0).sqrt());
+        let colour = self.colour.unwrap_or(Rgb::ZERO).clamp(Rgb::ZERO, Rgb::ONE);
+        metallic.clamp(0.0, 1.0) * smoothness.min(1.0) * colour
+    }
 }
 
 impl SpecularStatements {
     /// The mirror or glass of these statements.
     pub fn surface(&self) -> Option<Specular> {
         let share = |colour: Rgb| colour.clamp(Rgb::ZERO, Rgb::ONE);
-        let reflectance = share(self.specular.unwrap_or(Rgb::ZERO));
+        let reflectance = match &self.metal {
+            Some(metal) => metal.reflectance(),
+            None => share(self.specular.unwrap_or(Rgb::ZERO)),
+        };
         let transmittance = match self.model {
             3 if reflectance != Rgb::ZERO => return Some(Specular::Mirror { reflectance }),
             5 if reflectance != Rgb::ZERO => return Some(Specular::Polished { reflectance }),
@@ -117,14 +151,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Option<Specular> {
-        let mut statements = SpecularStatements {
-            model: 0,
-            specular: None,
-            filter: None,
-            refractive_index: None,
-            dissolve: None,
-            transparency: None,
-        };
+        let mut statements = SpecularStatements::default();
         for statement in text.split(", ") {
             let words: Vec<&str> = statement.split(' ').collect();
             let number = |k: usize| words[k].parse::<f64>().unwrap();
@@ -143,6 +170,30 @@ mod tests {
             }
         }
         statements.surface()
+    }
+
+    /// Metals as Blender writes them: a polished one, the brass of a room (roughness 0.3), a rough
+    /// one, one that is half a metal, and without statements.
+    #[test]
+    fn metals_share_their_colour() {
+        let brass = Rgb::new(0.9, 0.7, 0.3);
+        let metal = |colour, metallic: Option<f64>, shininess| {
+            let metal = MetalStatements { colour, metallic: metallic.map(Rgb::splat), shininess };
+            let specular = Some(Rgb::splat(0.5));
+            let metal = Some(metal);
+            SpecularStatements { model: 3, specular, metal, ..Default::default() }.surface()
+        };
+        let mirror = |reflectance| Some(Specular::Mirror { reflectance });
+        assert_eq!(metal(Some(brass), Some(1.0), Some(1000.0)), mirror(brass));
+        assert_eq!(metal(Some(brass), Some(1.0), Some(490.0)), mirror(0.49f64.sqrt() * brass));
+        assert_eq!(metal(Some(brass), Some(0.5), Some(250.0)), mirror(0.25 * brass));
+        assert_eq!(metal(Some(brass), None, None), mirror(brass));
+        assert_eq!(metal(Some(2.0 * brass), Some(7.0), Some(1e9)).unwrap().share().y, 1.0);
+        for (colour, metallic, shininess) in
+            [(Some(brass), 1.0, 0.0), (Some(brass), 0.0, 490.0), (None, 1.0, 490.0)]
+        {
+            assert_eq!(metal(colour, Some(metallic), Some(shininess)), None);
+        }
     }
 
     #[test]

@@ -77,6 +77,11 @@ pub(super) fn lines<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = L
     })
 }
 
+/// Whether Blender's exporter wrote a file, by its first line: `# Blender 5.0.1` or alike.
+pub(super) fn is_by_blender(text: &str) -> bool {
+    text.strip_prefix('\u{feff}').unwrap_or(text).starts_with("# Blender ")
+}
+
 /// The words of `text` up to a comment.
 pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split_whitespace().take_while(|word| !word.starts_with('#'))

@@ -30,6 +30,8 @@ pub enum Sides {
     /// Each triangle reflects on the sides that light can reach, whatever its winding. It emits on
     /// its front, or on its back if the mean free path there is much longer.
     Auto,
+    /// Both sides reflect and emit, but for the inside of a body from which light gets nowhere.
+    Emitting,
 }
 
 /// Treatment of a triangle.
@@ -41,12 +43,14 @@ pub(crate) struct Treatment {
     pub turned: bool,
     /// The side that is not its front reflects too.
     pub doubled: bool,
+    /// That side emits too.
+    pub shines_on_both: bool,
 }
 
 impl Scene {
     /// The same scene with each of its triangles treated, and materials that have one side. Twins
-    /// follow all others, in their order. They emit nothing: if the triangle's material does, they
-    /// have another, of the same name, after all others.
+    /// follow all others, in their order. Unless both sides shine, they emit nothing: if the
+    /// triangle's material does, they have another, of the same name, after all others.
     pub(crate) fn treated(&self, treatments: &[Treatment]) -> Scene {
         let mut scene = self.clone();
         scene.materials.iter_mut().for_each(|material| material.sides = Sides::Front);
@@ -75,7 +79,8 @@ impl Scene {
                 cut.iter_mut().for_each(|sides| sides.swap(0, 2));
             }
             let material = triangle.material;
-            if is_twin && self.materials[material as usize].exitance != Rgb::ZERO {
+            let is_dark = is_twin && !treatments[t].shines_on_both;
+            if is_dark && self.materials[material as usize].exitance != Rgb::ZERO {
                 triangle.material = *dark.entry(material).or_insert_with(|| {
                     let index = scene.materials.len() as u32;
                     let without = scene.materials[material as usize].clone();

@@ -97,6 +97,16 @@ warning_kinds! {
         "textures with options that are not used";
     /// Transparency, which is not modelled.
     Transparency: "material with transparency", "materials with transparency";
+    /// A metal as Blender writes it.
+    Metal: "material of metal by Blender", "materials of metal by Blender";
+    /// A mirror whose `Kd` and `Ks` add up to more than 1.
+    MoreThanAll:
+        "mirror whose `Kd` and `Ks` are more than 1 together",
+        "mirrors whose `Kd` and `Ks` are more than 1 together";
+    /// A `map_Ke` without a strength.
+    EmissionStrength: "`map_Ke` without a `Ke`", "`map_Ke` without a `Ke`";
+    /// A file by a program whose export leaves light out.
+    Generator: "file by Blender's OBJ exporter", "files by Blender's OBJ exporter";
     /// A mirror or glass, which pictures show and the light solution simplifies.
     Specular: "material of mirror or glass", "materials of mirror or glass";
     /// `Ka` above 1, used as radiance.
@@ -146,6 +156,10 @@ warning_kinds! {
     RepeatedTriangle: "triangle given again", "triangles given again";
     /// A triangle that light reaches from behind only.
     Winding: "triangle lit from behind", "triangles lit from behind";
+    /// A lamp that could light something from the side on which it does not emit.
+    DarkBack:
+        "triangle of a lamp that faces surfaces on its dark side",
+        "triangles of lamps that face surfaces on their dark sides";
     /// A triangle that light reaches on both sides.
     BothSides: "triangle lit from both sides", "triangles lit from both sides";
 }

@@ -18,6 +18,7 @@
 //! bodies that intersect, the outside is lit and the inside is dark.
 
 mod closed_rooms;
+mod lamp_backs;
 mod repeated;
 mod sheets;
 mod walks;
@@ -31,14 +32,10 @@ use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::sampling::hash::split_mix64;
 use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
 use closed_rooms::closed_rooms;
+use lamp_backs::LampBacks;
 use repeated::repeated_triangles;
-use sheets::{Sheets, SideIndex, SideStatistics};
+use sheets::{LIT_SHARE, Sheets, SideIndex, SideStatistics};
 use walks::Walks;
-
-/// A sheet is dark if a smaller share of the walks from it reaches light. The share is 3 to 5 % in
-/// the gap between the Cornell box's lamp and its ceiling, and almost 0 through seams; in the
-/// second of two rooms, which has no lamp, it is 25 to 40 %.
-const LIT_SHARE: f64 = 0.1;
 
 impl Scene {
     /// The same scene with [`Sides`] applied: triangles of [`Sides::Auto`] are flipped so that
@@ -62,7 +59,7 @@ impl Scene {
         let drop = |&dropped: &bool| Treatment { dropped, ..Treatment::default() };
         let sides: Vec<Sides> = self.materials().iter().map(|material| material.sides).collect();
         let mut scene = self.treated(&repeated.iter().map(drop).collect::<Vec<_>>());
-        let treatments = treatments(&scene, &sides);
+        let (treatments, dark_backs) = treatments(&scene, &sides);
         let count = |is: fn(&Treatment) -> bool| {
             let concerned = (0..treatments.len()).filter(|&t| is(&treatments[t]));
             let groups: Vec<u32> = concerned.map(|t| scene.triangles()[t].group).collect();
@@ -85,6 +82,7 @@ impl Scene {
             let names = groups.iter().map(|&g| self.groups()[g as usize].as_str());
             scene.warn(Warning::new(kind, groups.len(), done).naming(names));
         }
+        dark_backs.into_iter().for_each(|warning| scene.warn(warning));
         scene
     }
 }
@@ -101,8 +99,9 @@ pub(crate) fn is_resolved(scene: &Scene) -> bool {
         && !(0..scene.triangles().len()).any(is_missing)
 }
 
-/// The treatment of each triangle of `scene`, whose materials have these `sides`.
-fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
+/// The treatment of each triangle of `scene`, whose materials have these `sides`, and the warning
+/// of lamps that are dark on a side from which they would light something.
+fn treatments(scene: &Scene, sides: &[Sides]) -> (Vec<Treatment>, Option<Warning>) {
     let count = scene.triangles().len();
     let sheets = Sheets::new(scene);
     let walks = Walks::new(scene, sides, &sheets);
@@ -113,6 +112,7 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
     });
     let lit = LitSides::new(scene, &light, &all);
     let is_room = closed_rooms(scene);
+    let backs = LampBacks::new(scene, &walks, &sheets);
     let treatment = |t: usize| {
         let is_glass = scene.material(t).specular.is_some_and(|specular| specular.is_glass());
         if is_glass && !scene.material(t).scatters() {
@@ -133,19 +133,22 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> Vec<Treatment> {
         let doubled = match walks.sides_of(t) {
             _ if is_translucent => !scene.is_back_covered(t),
             Sides::Front => false,
+            Sides::Emitting => backs.are_open(t),
             Sides::Both => true,
             Sides::Auto => is_other_lit && lit.is_bright(other) && !is_room[t],
         };
         let is_dark = walks.sides_of(t) == Sides::Auto && !is_front_lit && !is_back_lit;
         let reflects = scene.material(t).scatters() || scene.material(t).specular.is_some();
+        let shines_on_both = walks.sides_of(t) == Sides::Emitting;
         Treatment {
             dropped: walks.is_inner_side_of_lamp(t)
                 || is_dark && !is_glass && walks.has_light() && is_in_the_way(scene, &walks, t),
             turned,
-            doubled: doubled && reflects,
+            doubled: doubled && (reflects || shines_on_both),
+            shines_on_both,
         }
     };
-    (0..count).map(treatment).collect()
+    ((0..count).map(treatment).collect(), backs.warning(scene, &walks, &lit.is_lit))
 }
 
 /// The sides that light reaches.

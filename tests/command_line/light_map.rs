@@ -17,9 +17,12 @@ fn light_map_writes_all_it_says() {
     let endings = ["exr", "radiosity.exr", "glb", "ply", "png"];
     let first = endings.map(|ending| read(ending).unwrap());
     assert!(first.iter().all(|bytes| bytes.len() > 1000));
-    // What the program writes of a map can be verified.
+    // What the program writes of a map can be verified. Vertices are shared within charts: between
+    // half as many as faces, without seams, and three times as many.
     let ply = radiosity::read_ply(folder.path().join("box.light.ply")).unwrap();
-    assert!(ply.positions.len() == 3 * ply.faces.len() && ply.faces.len() > 1000);
+    assert!(ply.faces.len() > 200, "{}", ply.faces.len());
+    let shared = ply.positions.len() as f64 / ply.faces.len() as f64;
+    assert!((0.5..1.0).contains(&shared), "{shared}");
     // Two runs, the same bytes.
     assert!(run("light-map", &args).status.success());
     assert!(first == endings.map(|ending| read(ending).unwrap()));

@@ -11,6 +11,7 @@ mod sky;
 mod trade_off;
 mod usage;
 mod view_factors;
+mod viewer;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gltf::Glb;
 use gltf::mesh::Semantic;
-use radiosity::glam::{DVec3, Vec3};
+use radiosity::glam::{DVec3, Quat, Vec3};
 use radiosity::io::ToneCurve;
 use radiosity::{
     ErrorKind, GatheredMesh, Material, Mesh, Rgb, Scene, Triangle, load_obj, write_glb,
@@ -38,7 +38,7 @@ fn light(at: DVec3) -> GatheredMesh {
 #[derive(Debug)]
 struct Read {
     names: [String; 2],
-    /// Where its positions are relative to.
+    /// Where its positions are relative to, in the axes of the scene.
     origin: Vec3,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -57,7 +57,8 @@ fn read(path: &Path) -> Vec<Read> {
     let binary = glb.bin.as_deref().unwrap();
     assert_eq!(document.buffers().next().unwrap().length(), binary.len());
     let top = document.default_scene().unwrap().nodes().next().unwrap();
-    let origin = Vec3::from(top.transform().decomposed().0);
+    let (translation, rotation, _) = top.transform().decomposed();
+    let origin = Quat::from_array(rotation).inverse() * Vec3::from(translation);
     let mut found = vec![];
     for node in top.children() {
         for primitive in node.mesh().unwrap().primitives() {

@@ -30,6 +30,31 @@ fn exr_reads_back_bit_for_bit() {
     assert_eq!(read.layer_data.channel_data.pixels, want);
 }
 
+/// Engines that read no tiles read this.
+#[test]
+fn exr_has_blocks_of_scan_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    for (width, height) in [(4, 3), (1, 1), (70, 33)] {
+        let path = folder.path().join(format!("{width}.exr"));
+        let count = width * height;
+        let pixels = (0..count).map(|k| Rgb::splat(f64::from(k))).collect();
+        let sky = vec![false; count as usize];
+        write_exr(&path, &RadianceImage { width, height, pixels, sky }).unwrap();
+        let meta = exr::meta::MetaData::read_from_file(&path, true).unwrap();
+        let [header] = &meta.headers[..] else { panic!("one part: {meta:?}") };
+        assert!(!meta.requirements.is_single_layer_and_tiled);
+        assert_eq!(header.blocks, exr::meta::BlockDescription::ScanLines);
+        assert_eq!(header.compression, exr::compression::Compression::ZIP16);
+        assert_eq!(header.line_order, exr::meta::attribute::LineOrder::Increasing);
+        assert_eq!(header.chunk_count, height.div_ceil(16) as usize);
+        let channels = &header.channels.list;
+        let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+        assert_eq!(names, ["B", "G", "R"]);
+        let float = exr::meta::attribute::SampleType::F32;
+        assert!(channels.iter().all(|c| c.sample_type == float && c.sampling.area() == 1));
+    }
+}
+
 /// Blocks that several threads compress may come in any order.
 #[test]
 fn exr_has_the_same_bytes_on_every_run() {

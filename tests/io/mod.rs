@@ -1,4 +1,8 @@
+#[cfg(feature = "textures")]
+mod blender;
 mod glb;
+mod glb_frame;
+mod glb_sides;
 mod image;
 #[cfg(feature = "textures")]
 mod masks;

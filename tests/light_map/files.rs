@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 use radiosity::backend::cpu::RayGather;
 use radiosity::io::{
     ToneCurve, write_light_map_exr, write_light_map_glb, write_light_map_radiosity,
@@ -58,6 +58,10 @@ fn exr_has_irradiance_and_coverage() {
     let size = image.layer_data.size;
     assert_eq!((size.x(), size.y()), (32, 32));
     assert!(map.gathered.contains(&true) && map.gathered.contains(&false));
+    // Scan lines, ZIP: some engines do not read tiles.
+    let attributes = exr::meta::MetaData::read_from_file(&path, true).unwrap().headers.remove(0);
+    assert_eq!(attributes.blocks, exr::meta::BlockDescription::ScanLines);
+    assert_eq!(attributes.compression, exr::compression::Compression::ZIP16);
     let path = folder.path().join("b.exr");
     write_light_map_radiosity(&path, &map).unwrap();
     let image = exr::prelude::read_first_flat_layer_from_file(&path).unwrap();
@@ -81,7 +85,13 @@ fn glb_has_places_in_the_map_and_in_the_textures_of_the_file() {
         let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(&bytes).unwrap();
         let binary = blob.unwrap();
         let top = document.default_scene().unwrap().nodes().next().unwrap();
-        let origin = Vec3::from(top.transform().decomposed().0);
+        // Far from the origin positions are relative to the middle.
+        let middle = scene.bounds().centre().as_vec3();
+        let origin = if at > 0.0 { middle } else { Vec3::ZERO };
+        let (moved, rotation, _) = top.transform().decomposed();
+        let moved = Quat::from_array(rotation).inverse() * Vec3::from(moved);
+        // Rotations of 24 bits, and back.
+        assert!(moved.distance(origin) <= 1e-6 * origin.length());
         let mut t = 0;
         for node in top.children() {
             for primitive in node.mesh().unwrap().primitives() {
@@ -118,7 +128,6 @@ fn glb_has_places_in_the_map_and_in_the_textures_of_the_file() {
             }
         }
         assert_eq!(t, scene.triangles().len());
-        assert_eq!(origin.as_dvec3().distance(DVec3::ZERO) > 1.0, at > 0.0);
         // The image is the radiosity through the tone curve.
         let gltf::image::Source::View { view, .. } = document.images().next().unwrap().source()
         else {

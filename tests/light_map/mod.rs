@@ -2,3 +2,5 @@ mod atlas;
 mod files;
 mod light;
 mod shown_error;
+#[cfg(feature = "textures")]
+mod textured_glb;

@@ -1,2 +1,3 @@
+mod lamp_sides;
 mod luminaires;
 mod sides;

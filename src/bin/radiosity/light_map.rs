@@ -12,20 +12,23 @@ use radiosity::io::{
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::verify::Estimate;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorKind, Scene};
+use radiosity::{
+    Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorKind, Scene, Sky,
+};
 
 use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
 };
-use crate::bake::files::{SAMPLES, camera};
+use crate::bake::files::{self, SAMPLES, camera};
 use crate::scene_options::{Input, SceneOptions};
+use crate::viewer_options::ViewerOptions;
 use crate::{interrupt, progress};
 
 /// Texels along a side where the error asked for says how many: the fewest and the most.
 const PIXELS: RangeInclusive<u32> = 64..=2048;
 
 /// Pixels of the picture.
-const PICTURE: (u32, u32) = (768, 512);
+const PICTURE: [u32; 2] = [768, 512];
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,8 +82,8 @@ pub struct Options {
     radiosity: bool,
     #[command(flatten)]
     output: Output,
-    /// Files: exr; glb; ply, the scene cut to texels with the light of the map, for `radiosity
-    /// verify`; png, a picture of that
+    /// Files: exr; glb; ply, the scene cut to pieces of two texels with the light of the map, for
+    /// `radiosity verify`; png, a picture of that
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "exr,glb")]
     formats: List<Format>,
@@ -88,6 +91,8 @@ pub struct Options {
     /// [0,1,0]
     #[arg(long, value_name = "NUMBERS", value_parser = camera)]
     camera: Option<Camera>,
+    #[command(flatten)]
+    viewer: ViewerOptions,
     #[command(flatten)]
     measure: MeasureOptions,
     #[command(flatten)]
@@ -137,8 +142,9 @@ impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
         if let Some(camera) = &self.camera {
-            camera.check(PICTURE.0, PICTURE.1, SAMPLES)?;
+            camera.check(PICTURE[0], PICTURE[1], SAMPLES)?;
         }
+        self.viewer.check()?;
         let endings = args::names(FORMATS);
         self.output.name(self.scene.with_extension("light-map"), &endings)?;
         let start = Instant::now();
@@ -150,13 +156,17 @@ impl Options {
         let device = self.device.open()?;
         let open = start.elapsed().as_secs_f64();
         interrupt::catch();
-        let baked = progress::of_bake(|_, report| {
+        let mut baked = progress::of_bake(|_, report| {
             let measure = |settings: &mut BakeSettings| settings.measure = self.measure.measure();
             self.target().bake_with(atlas.scene().clone(), &device, measure, report)
         })?;
         let bake = start.elapsed().as_secs_f64();
         let (map, shown) = self.map(atlas, &baked, &device)?;
         let texels = start.elapsed().as_secs_f64();
+        if self.reading.sky.is_default() {
+            // As in the picture of a bake.
+            baked.light.surface.sky = Sky::default();
+        }
         self.write(&map, &baked)?;
         print_map(&map, &baked);
         let total = start.elapsed().as_secs_f64();
@@ -292,7 +302,6 @@ impl Options {
     fn write(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {
         let writes = |format: Format| self.formats.contains(&format);
         let path = |ending: &str| self.output.path(ending);
-        let tone = ToneCurve::fit(&baked.light.surface.radiosity);
         if writes(Format::Exr) {
             progress::of_writing(&path("exr"), |path| write_light_map_exr(path, map))?;
         }
@@ -300,8 +309,14 @@ impl Options {
             let write = |path: &Path| write_light_map_radiosity(path, map);
             progress::of_writing(&path("radiosity.exr"), write)?;
         }
+        if !writes(Format::Glb) && !writes(Format::Ply) && !writes(Format::Png) {
+            return Ok(());
+        }
+        let tone = self.tone(baked)?;
         if writes(Format::Glb) {
-            progress::of_writing(&path("glb"), |path| write_light_map_glb(path, map, &tone))?;
+            let settings = self.viewer.glb(&tone, baked);
+            let write = |path: &Path| write_light_map_glb(path, map, settings.clone());
+            progress::of_writing(&path("glb"), write)?;
         }
         if !writes(Format::Ply) && !writes(Format::Png) {
             return Ok(());
@@ -311,13 +326,30 @@ impl Options {
             progress::of_writing(&path("ply"), |path| write_ply_with_tone(path, &surface, &tone))?;
         }
         if writes(Format::Png) {
-            let (width, height) = PICTURE;
-            let aspect = f64::from(width) / f64::from(height);
-            let camera = self.camera.unwrap_or_else(|| Camera::framing(&baked.light, aspect));
-            let image = camera.image(&surface, width, height, SAMPLES)?;
-            let tone = ToneCurve::fit_image(&image);
+            let [width, height] = PICTURE;
+            let image = self.camera(baked, PICTURE).image(&surface, width, height, SAMPLES)?;
+            let tone = self.viewer.of_picture(&image);
             progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
         }
         Ok(())
+    }
+
+    /// The camera of a picture of so many pixels.
+    fn camera(&self, baked: &BakeResult, [width, height]: [u32; 2]) -> Camera {
+        let aspect = f64::from(width) / f64::from(height);
+        self.camera.unwrap_or_else(|| Camera::framing(&baked.light, aspect))
+    }
+
+    /// The curve of radiosity that the files of a bake are shown with.
+    fn tone(&self, baked: &BakeResult) -> Result<ToneCurve, Error> {
+        if let Some(given) = self.viewer.given() {
+            return Ok(given.of_radiosity());
+        }
+        let [width, height] = files::IMAGE;
+        let camera = self.camera(baked, files::IMAGE);
+        let image = progress::of_count("pixels of the picture", |report| {
+            camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
+        })?;
+        Ok(self.viewer.of_meshes(image.as_ref(), baked))
     }
 }

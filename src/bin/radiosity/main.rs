@@ -41,6 +41,7 @@ mod sky;
 mod trade_off;
 mod verify;
 mod view_factors;
+mod viewer_options;
 
 use std::process::ExitCode;
 

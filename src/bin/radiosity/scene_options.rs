@@ -15,12 +15,19 @@ use crate::sky::SkyOptions;
 const SIDES: Names<Sides> =
     &[("auto", Sides::Auto), ("front", Sides::Front), ("both", Sides::Both)];
 
+/// Of the light of lamps.
+const EMIT_SIDES: Names<Sides> = &[("front", Sides::Front), ("both", Sides::Both)];
+
 const SPECULAR: Names<SpecularSurfaces> = &[
     ("clear", SpecularSurfaces::Clear),
     ("diffuse", SpecularSurfaces::Diffuse),
     ("black", SpecularSurfaces::Black),
     ("ignore", SpecularSurfaces::Ignore),
 ];
+
+/// Units of a scene's lengths, in metres.
+pub const UNITS: Names<f64> =
+    &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)];
 
 /// How a scene is read, and what lights it.
 #[derive(Args)]
@@ -30,9 +37,14 @@ pub struct SceneOptions {
     pub sky: SkyOptions,
     #[command(flatten)]
     luminaires: LuminaireOptions,
-    /// Radiance that this material emits, W/(m² sr); may be repeated
+    /// Radiance that this material emits, W/(m² sr), times its `map_Ke` if it has one; may be
+    /// repeated
     #[arg(long, value_name = "MATERIAL=r,g,b", value_parser = of_material)]
     emit: Vec<(String, Rgb)>,
+    /// Sides of faces that emit: front, or both as in Blender
+    #[arg(long, value_name = "SIDES", default_value = "front")]
+    #[arg(value_parser = one_of(EMIT_SIDES))]
+    emit_sides: Sides,
     /// Share of the light on either side of this material that leaves diffusely from the other side
     /// instead of being reflected; may be repeated
     #[arg(long, value_name = "MATERIAL=r,g,b", hide = true, value_parser = of_material)]
@@ -84,6 +96,7 @@ impl SceneOptions {
             obj.strict = self.strict;
             obj.max_reflectance = self.max_reflectance;
             obj.emit.clone_from(&self.emit);
+            obj.emit_both_sides = self.emit_sides == Sides::Both;
             obj.transmit.clone_from(&self.transmit);
             obj.sides = self.sides;
             obj.specular = self.specular;

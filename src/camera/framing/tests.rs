@@ -105,6 +105,30 @@ fn houses_stand_upright() {
     }
 }
 
+/// What is given as up is: the view is from 25 degrees above.
+#[test]
+fn view_is_upright_where_up_is_given() {
+    let table = [([0.0, 0.0, 0.0], [2.0, 1.0, 0.1], false)];
+    let scene = light_of(&table, DVec3::Z).mesh.scene().clone();
+    let view = |scene: Scene| {
+        let mesh = Mesh::new(scene, 10.0).unwrap();
+        let radiosity = vec![Rgb::ONE; mesh.element_count()];
+        Camera::framing(&GatheredMesh::from_elements(&mesh, &radiosity).unwrap(), 1.0)
+    };
+    for up in [DVec3::Y, DVec3::Z, DVec3::NEG_Y, DVec3::X, DVec3::new(0.0, 3.0, 3.0)] {
+        let camera = view(scene.clone().with_up(up));
+        assert_eq!(camera.up, up.normalize());
+        // Rounded to 1e-4 of the scene.
+        let down = (camera.target - camera.eye).normalize().dot(camera.up);
+        assert!((down + 25f64.to_radians().sin()).abs() < 1e-3, "{up}: {camera:?}");
+        assert!(camera.check(4, 4, 1).is_ok());
+    }
+    // By default it is the axis of the scene, and no direction is as none given.
+    let found = scene.up();
+    assert_eq!(view(scene.clone()), view(scene.clone().with_up(found)));
+    assert_eq!(view(scene.clone()), view(scene.with_up(DVec3::ZERO)));
+}
+
 /// A small object on a ground a hundred times its size is framed, not the ground.
 #[test]
 fn ground_does_not_make_the_object_small() {

@@ -9,7 +9,6 @@ use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Stride, Target, View};
 use gltf_json::extras::RawValue;
 use gltf_json::image::MimeType;
-use gltf_json::material::{PbrMetallicRoughness, StrengthFactor};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::scene::Node;
 use gltf_json::texture::{MagFilter, MinFilter, Sampler, Texture, WrappingMode};
@@ -18,7 +17,6 @@ use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Sce
 
 use crate::error::Error;
 use crate::io::{cannot_write, write_file};
-use crate::scene::{self, Rgb};
 
 /// Accessors of the attributes of a primitive.
 pub(super) type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
@@ -191,21 +189,13 @@ impl GlbFile {
         length
     }
 
-    /// Writes the file: a header, a chunk of JSON and one of numbers. Its scene is a node with the
-    /// nodes of all `groups`, whose positions are relative to `origin`.
+    /// Writes the file: a header, a chunk of JSON and one of numbers. Its scene is the node `top`
+    /// with the nodes of all `groups`.
     ///
     /// # Errors
     /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
-    pub fn write(
-        mut self,
-        path: &Path,
-        groups: Vec<Index<Node>>,
-        origin: Vec3,
-    ) -> Result<(), Error> {
-        let translation = (origin != Vec3::ZERO).then(|| origin.to_array());
-        let name = Some("scene".into());
-        let top = Node { name, children: Some(groups), translation, ..Default::default() };
-        let nodes = vec![self.root.push(top)];
+    pub fn write(mut self, path: &Path, top: Node, groups: Vec<Index<Node>>) -> Result<(), Error> {
+        let nodes = vec![self.root.push(Node { children: Some(groups), ..top })];
         let scene = Scene { nodes, name: None, extensions: None, extras: None };
         self.root.scene = Some(self.root.push(scene));
         let length = self.lay_out_views();
@@ -239,26 +229,6 @@ impl GlbFile {
     }
 }
 
-/// A material of the scene with its light as its unlit `colour`.
-pub(super) fn unlit(material: &scene::Material, colour: PbrMetallicRoughness) -> Material {
-    let channels = |c: Rgb| Value::from(c.to_array().to_vec());
-    let notes = BTreeMap::from([
-        ("reflectance", channels(material.reflectance)),
-        ("exitance", channels(material.exitance)),
-    ]);
-    let unlit = gltf_json::extensions::material::Unlit {};
-    Material {
-        name: Some(material.name.clone()),
-        pbr_metallic_roughness: PbrMetallicRoughness {
-            metallic_factor: StrengthFactor(0.0),
-            ..colour
-        },
-        extensions: Some(gltf_json::extensions::material::Material { unlit: Some(unlit) }),
-        extras: notes_of(&notes),
-        ..Default::default()
-    }
-}
-
 /// `count` items in a view, from an offset in bytes on.
 fn accessor(
     view: usize,
@@ -284,7 +254,7 @@ fn accessor(
 }
 
 /// `extras` with these entries.
-fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
+pub(super) fn notes_of(notes: &BTreeMap<&str, Value>) -> Option<Box<RawValue>> {
     let text = gltf_json::serialize::to_string(notes).ok()?;
     RawValue::from_string(text).ok()
 }

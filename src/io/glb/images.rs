@@ -14,8 +14,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageResult};
 use rayon::prelude::*;
 
-use super::primitives::{Primitive, Shown};
-use crate::gather::GatheredMesh;
+use super::primitives::Shown;
 use crate::io::tone::{ToneCurve, srgb};
 use crate::scene::{Material, Rgb};
 
@@ -34,23 +33,22 @@ pub(super) struct Image {
 }
 
 impl Images {
-    /// The images of all materials of `primitives` with a texture.
+    /// The images of all materials of `surfaces`: textured ones, of some material, with the
+    /// irradiances at their vertices.
     ///
     /// # Errors
     /// When one cannot be encoded.
-    pub fn new(
-        light: &GatheredMesh,
+    pub fn new<'a>(
+        materials: &[Material],
         tone: &ToneCurve,
-        primitives: &[Primitive<'_>],
+        surfaces: impl Iterator<Item = (u32, Shown<'a>, Vec<Rgb>)>,
     ) -> ImageResult<Images> {
         let mut textured: BTreeMap<u32, (Shown<'_>, Vec<Rgb>)> = BTreeMap::new();
-        for primitive in primitives {
-            let Some(shown) = primitive.shown else { continue };
-            let (_, irradiances) = textured.entry(primitive.material).or_insert((shown, vec![]));
-            irradiances.extend(primitive.vertices.iter().map(|&v| irradiance(light, v)));
+        for (material, shown, irradiances) in surfaces {
+            textured.entry(material).or_insert((shown, vec![])).1.extend(irradiances);
         }
         let image = |(number, (shown, irradiances)): (u32, (Shown<'_>, Vec<Rgb>))| {
-            let material = &light.mesh.scene().materials()[number as usize];
+            let material = &materials[number as usize];
             let image = Image::new(material, shown, median(irradiances, material, tone), tone)?;
             Ok((number, image))
         };
@@ -159,11 +157,6 @@ pub(super) fn png(
     PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
         .write_image(bytes, width, height, format)?;
     Ok(png)
-}
-
-/// Irradiance of a vertex; 0 if unknown.
-pub(super) fn irradiance(light: &GatheredMesh, vertex: u32) -> Rgb {
-    light.surface.irradiance.get(vertex as usize).copied().unwrap_or(Rgb::ZERO)
 }
 
 /// Radiosity of a surface with the means of its material's textures everywhere, W/m².

@@ -1,164 +1,170 @@
-//! A scene with its light map as glTF binary: the scene's own triangles, and one image for all.
+//! A scene with its light map as glTF binary: the scene's own triangles, and one image for all but
+//! textured ones. Those have their textures, times the map's light at vertices that are as dense as
+//! texels: glTF has no material that multiplies two images.
+
+mod vertices;
 
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-use glam::{DVec2, Vec3};
-use gltf_json::material::PbrMetallicRoughness;
+use glam::Vec3;
 use gltf_json::mesh::Semantic;
-use gltf_json::texture::{Info, MinFilter};
+use gltf_json::texture::MinFilter;
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Index, Value};
-use image::ExtendedColorType;
-use rustc_hash::FxHashMap;
+use gltf_json::{Index, Material, Texture, Value};
+use image::{ExtendedColorType, ImageResult};
 
-use super::file::{Attributes, GlbFile, unlit};
-use super::images::png;
+use super::file::{Attributes, GlbFile};
+use super::images::{Images, mean_radiosity, png};
+use super::materials::{Look, unlit};
 use super::origin;
-use super::primitives::Shown;
+use super::settings::GlbSettings;
 use crate::error::Error;
 use crate::io::cannot_write;
-use crate::io::tone::ToneCurve;
 use crate::light_map::LightMap;
-use crate::mesh::SurfaceTopology;
+use crate::scene::Rgb;
+use vertices::{Primitive, Vertex, primitives};
 
-/// Writes the scene of a light map as glTF 2.0 binary, `.glb`: its own triangles with `POSITION`,
-/// `NORMAL` (of smooth surfaces), `TEXCOORD_1`, the coordinates in the light map, and `TEXCOORD_0`,
-/// those of the scene's file on materials all of whose faces have some, else the same as
-/// `TEXCOORD_1`.
+/// Writes the scene of a light map as glTF 2.0 binary, `.glb`, with `POSITION`, `NORMAL` (of smooth
+/// surfaces), `TEXCOORD_1`, the coordinates in the light map, and `TEXCOORD_0`, those of the
+/// scene's file on materials all of whose faces have some, else the same as `TEXCOORD_1`.
 ///
-/// A node for each group and a primitive for each of its materials, by their names; their `extras`
-/// have reflectance and exitance. The file has the map's radiosity, without textures, as an image
-/// (PNG) through `tone`, a curve of radiosity. Materials are unlit and have it as their colour, so
-/// that viewers show the light unchanged. A program with its own textures takes the irradiance of
+/// A node for each group and a primitive for each of its materials, by their names; materials and
+/// axes are as with [`write_glb`](crate::write_glb), and the two sides of a surface always lie
+/// apart. The file has the map's radiosity as an image (PNG) through a tone curve of radiosity, the
+/// colour of the scene's own triangles. Triangles with a texture, of `map_Ke` before `map_Kd`, have
+/// that instead, cut to elements of two texels of the map, whose light is in `COLOR_0`. A program
+/// with a light map of its own multiplies the textures with the irradiance of
 /// [`write_light_map_exr`](crate::io::write_light_map_exr) instead.
 ///
-/// Lengths and axes are those of the scene's file, as with [`write_glb`](crate::write_glb).
-///
 /// # Errors
-/// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
+/// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB; those
+/// of [`LightMap::surface`].
 pub fn write_light_map_glb(
     path: impl AsRef<Path>,
     map: &LightMap,
-    tone: &ToneCurve,
+    settings: impl Into<GlbSettings>,
 ) -> Result<(), Error> {
-    let path = path.as_ref();
-    let bytes: Vec<u8> = map.radiosity().into_iter().flat_map(|c| tone.display(c)).collect();
-    let size = [map.atlas.width(), map.atlas.height()];
-    let png = png(&bytes, size, ExtendedColorType::Rgb8);
-    let png = png.map_err(|e| cannot_write(path, io::Error::other(e)))?;
+    let (path, settings) = (path.as_ref(), settings.into());
+    let failed = |e| cannot_write(path, io::Error::other(e));
     let (scene, origin) = (map.atlas.scene(), origin(map.atlas.scene().bounds()));
-    let mut file = GlbFile::new(&BTreeMap::from([
-        ("axes", Value::from("those of the scene's file")),
-        ("unit", Value::from("that of the scene's file")),
-        ("TEXCOORD_1", Value::from("places in the light map")),
-        ("light map", Value::from("radiosity times exposure, highlights rolled off")),
-        ("exposure", Value::from(tone.exposure())),
-    ]));
-    // Without mipmaps, in which charts would run together.
-    let index = file.add_texture(Index::new(0), MinFilter::Linear, true);
+    let primitives = primitives(map, origin)?;
+    let model = Model::new(map, &settings, &primitives).map_err(failed)?;
+    let mut file = GlbFile::new(&model.notes());
+    // The first image. Without mipmaps, in which charts would run together.
+    let of_map = file.add_texture(Index::new(0), MinFilter::Linear, true);
     let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
-    for of_group in primitives(map, origin).chunk_by(|a, b| a.group == b.group) {
+    for of_group in primitives.chunk_by(|a, b| a.group == b.group) {
         let mut parts = vec![];
         for primitive in of_group {
-            let material = *materials.entry(primitive.material).or_insert_with(|| {
-                let texture = Info { index, tex_coord: 1, extensions: None, extras: None };
-                let colour = PbrMetallicRoughness {
-                    base_color_texture: Some(texture),
-                    ..Default::default()
-                };
-                let material = &scene.materials()[primitive.material as usize];
-                file.add_material(unlit(material, colour))
-            });
-            let attributes = primitive.add_attributes(&mut file);
+            let key = (primitive.material, primitive.shown.is_some());
+            let material = || model.add_material(&mut file, primitive, of_map);
+            let material = *materials.entry(key).or_insert_with(material);
+            let attributes = model.add_attributes(&mut file, primitive);
             parts.push(file.triangles(attributes, &primitive.faces, material));
         }
         groups.push(file.add_group(&scene.groups()[of_group[0].group as usize], parts));
     }
-    file.add_image(png, Some("light map"));
-    file.write(path, groups, origin)
-}
-
-/// The triangles of one group and one material.
-#[derive(Default)]
-struct Primitive {
-    group: u32,
-    material: u32,
-    /// Of each vertex.
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    /// Texture coordinates in the map and in the scene's file, v downwards; the latter not finite
-    /// where it has none.
-    places: Vec<[f32; 2]>,
-    given: Vec<[f32; 2]>,
-    faces: Vec<[u32; 3]>,
-}
-
-/// The triangles of a map's scene by group, then material, positions relative to `origin`.
-fn primitives(map: &LightMap, origin: Vec3) -> Vec<Primitive> {
-    let scene = map.atlas.scene();
-    let (topology, normals) = (SurfaceTopology::of_scene(scene), scene_normals(map));
-    let mut primitives: BTreeMap<(u32, u32), Primitive> = BTreeMap::new();
-    // Corners of one smooth surface are one vertex if their coordinates are equal.
-    let mut numbers: FxHashMap<(u32, [u32; 4]), u32> = FxHashMap::default();
-    for (t, triangle) in scene.triangles().iter().enumerate() {
-        let (group, material) = (triangle.group, triangle.material);
-        let primitive = primitives.entry((group, material));
-        let primitive = primitive.or_insert(Primitive { group, material, ..Default::default() });
-        let (corners, places, given) =
-            (scene.corners(t), map.atlas.coordinates(t), given_places(map, t));
-        let face = [0, 1, 2].map(|k| {
-            let (place, given) = (places[k].as_vec2(), given[k].as_vec2());
-            let bits = [place.x, place.y, given.x, given.y].map(f32::to_bits);
-            // A smooth surface has one group and one material.
-            *numbers.entry((topology.corners[t][k], bits)).or_insert_with(|| {
-                let position = (corners[k] - origin.as_dvec3()).as_vec3();
-                primitive.positions.push(position.to_array());
-                primitive.normals.push(normals[t][k].to_array());
-                primitive.places.push(place.to_array());
-                primitive.given.push(given.to_array());
-                primitive.positions.len() as u32 - 1
-            })
-        });
-        primitive.faces.push(face);
+    file.add_image(model.image().map_err(failed)?, Some("light map"));
+    for png in model.images.into_files() {
+        file.add_image(png, None);
     }
-    primitives.into_values().collect()
+    file.write(path, settings.top_node(scene, origin.as_dvec3()), groups)
 }
 
-impl Primitive {
-    fn add_attributes(&self, file: &mut GlbFile) -> Attributes {
-        let positions = file.add_positions(&self.positions);
-        let normals = file.add_vectors("NORMAL", &self.normals);
-        let places = file.add_vectors("TEXCOORD_1", &self.places);
+/// The file's content beside its triangles.
+struct Model<'a> {
+    map: &'a LightMap,
+    settings: &'a GlbSettings,
+    /// Of textured materials.
+    images: Images,
+}
+
+impl Model<'_> {
+    fn new<'a>(
+        map: &'a LightMap,
+        settings: &'a GlbSettings,
+        primitives: &[Primitive<'_>],
+    ) -> ImageResult<Model<'a>> {
+        let textured =
+            primitives.iter().filter_map(|p| Some((p.material, p.shown?, p.irradiances.clone())));
+        let images = Images::new(map.atlas.scene().materials(), &settings.tone, textured)?;
+        Ok(Model { map, settings, images })
+    }
+
+    fn notes(&self) -> BTreeMap<&'static str, Value> {
+        let image = "radiosity times exposure, highlights rolled off; textured materials have \
+                     their textures in their median light, and COLOR_0 relative to that";
+        BTreeMap::from([
+            ("TEXCOORD_1", Value::from("places in the light map")),
+            ("light map", Value::from(image)),
+            ("exposure", Value::from(self.settings.tone.exposure())),
+        ])
+    }
+
+    /// The light map as PNG, in colours.
+    fn image(&self) -> ImageResult<Vec<u8>> {
+        let tone = &self.settings.tone;
+        let colours = self.map.radiosity().into_iter();
+        let bytes: Vec<u8> = colours.flat_map(|c| tone.display(c)).collect();
+        let size = [self.map.atlas.width(), self.map.atlas.height()];
+        png(&bytes, size, ExtendedColorType::Rgb8)
+    }
+
+    fn add_material(
+        &self,
+        file: &mut GlbFile,
+        primitive: &Primitive<'_>,
+        of_map: Index<Texture>,
+    ) -> Index<Material> {
+        let texture = match primitive.shown.zip(self.images.number(primitive.material)) {
+            Some((shown, number)) => {
+                let clamped = shown.frame().is_some_and(|map| map.clamped);
+                // The light map is before them.
+                let source = Index::new(number as u32 + 1);
+                (file.add_texture(source, MinFilter::LinearMipmapLinear, clamped), 0)
+            }
+            None => (of_map, 1),
+        };
+        let has_mask = primitive.shown.is_some_and(|shown| shown.mask.is_some());
+        let material = &self.map.atlas.scene().materials()[primitive.material as usize];
+        let look = Look { texture: Some(texture), has_mask, is_double_sided: false };
+        file.add_material(unlit(material, look))
+    }
+
+    fn add_attributes(&self, file: &mut GlbFile, primitive: &Primitive<'_>) -> Attributes {
+        let vectors = |set: &[Vec3]| set.iter().map(Vec3::to_array).collect::<Vec<_>>();
+        let positions: Vec<Vec3> = primitive.vertices.iter().map(|v| v.position).collect();
+        let normals: Vec<Vec3> = primitive.vertices.iter().map(|v| v.normal).collect();
+        let set = |of: fn(&Vertex) -> [f32; 2]| primitive.vertices.iter().map(of).collect();
+        let (places, given): (Vec<_>, Vec<_>) = (set(|v| v.place), set(|v| v.given));
+        let positions = file.add_positions(&vectors(&positions));
+        let normals = file.add_vectors("NORMAL", &vectors(&normals));
+        let places = file.add_vectors("TEXCOORD_1", &places);
         // glTF numbers sets of coordinates from 0 on: without the file's, the map's are used for
         // both.
-        let given = match self.given.as_flattened().iter().all(|x| x.is_finite()) {
-            true => file.add_vectors("TEXCOORD_0", &self.given),
+        let given = match given.as_flattened().iter().all(|x| x.is_finite()) {
+            true => file.add_vectors("TEXCOORD_0", &given),
             false => places,
         };
-        Attributes::from([
+        let mut all = Attributes::from([
             (Valid(Semantic::Positions), positions),
             (Valid(Semantic::Normals), normals),
             (Valid(Semantic::TexCoords(0)), given),
             (Valid(Semantic::TexCoords(1)), places),
-        ])
+        ]);
+        let image = primitive.shown.and_then(|_| self.images.get(primitive.material));
+        if let Some(image) = image {
+            let material = &self.map.atlas.scene().materials()[primitive.material as usize];
+            let colour = |&irradiance: &Rgb| {
+                let mean = self.settings.tone.linear(mean_radiosity(material, irradiance));
+                image.vertex_colour(mean).as_vec3()
+            };
+            let colours: Vec<Vec3> = primitive.irradiances.iter().map(colour).collect();
+            let colours = file.add_vectors("COLOR_0", &vectors(&colours));
+            all.insert(Valid(Semantic::Colors(0)), colours);
+        }
+        all
     }
-}
-
-/// Unit normals at the corners of each triangle, as glTF requires.
-fn scene_normals(map: &LightMap) -> Vec<[Vec3; 3]> {
-    let unit = |corners: [glam::DVec3; 3]| corners.map(|n| n.as_vec3().normalize_or(Vec3::Y));
-    map.atlas.corner_normals().into_iter().map(unit).collect()
-}
-
-/// Texture coordinates of the corners of triangle `t` in its file, v downwards; not finite if it
-/// has none.
-fn given_places(map: &LightMap, t: usize) -> [DVec2; 3] {
-    let scene = map.atlas.scene();
-    let frame = scene.textures(t).and_then(Shown::of).and_then(|shown| shown.frame());
-    scene.texture_coordinates(t).unwrap_or([DVec2::NAN; 3]).map(|place| {
-        let place = frame.map_or(place, |map| place * map.scale + map.offset);
-        DVec2::new(place.x, 1.0 - place.y)
-    })
 }

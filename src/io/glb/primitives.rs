@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, Vec2};
 use rustc_hash::FxHashMap;
 
+use super::two_sides::TwoSides;
 use crate::gather::GatheredMesh;
 use crate::scene::texture::{MaterialTextures, TextureMap};
 
@@ -15,6 +16,8 @@ use crate::scene::texture::{MaterialTextures, TextureMap};
 pub(super) struct Primitive<'a> {
     pub group: u32,
     pub material: u32,
+    /// Whether the faces stand for both sides of a surface.
+    pub is_double_sided: bool,
     /// Vertices of the surface, in the order of the file.
     pub vertices: Vec<u32>,
     /// Texture coordinates of each, v downwards; empty where a corner has none.
@@ -52,25 +55,33 @@ impl<'a> Shown<'a> {
 /// A face of the surface, and its triangle of the scene.
 type Face = ([u32; 3], usize);
 
+/// Group, material, and whether both sides are seen.
+type Key = (u32, u32, bool);
+
 /// The faces of `light` by group, then material, in the order of the scene's.
-pub(super) fn primitives(light: &GatheredMesh) -> Vec<Primitive<'_>> {
+pub(super) fn primitives<'a>(light: &'a GatheredMesh, sides: &TwoSides) -> Vec<Primitive<'a>> {
     let (surface, mesh) = (&light.surface, &light.mesh);
-    let mut faces: BTreeMap<(u32, u32), Vec<Face>> = BTreeMap::new();
+    let mut faces: BTreeMap<Key, Vec<Face>> = BTreeMap::new();
     for (&face, &element) in surface.faces.iter().zip(&surface.elements) {
         let t = mesh.triangle(mesh.element(element as usize));
-        let triangle = mesh.scene().triangles()[t];
-        faces.entry((triangle.group, triangle.material)).or_default().push((face, t));
+        if !sides.is_omitted(t) {
+            let triangle = mesh.scene().triangles()[t];
+            let key = (triangle.group, triangle.material, sides.is_double_sided(t));
+            faces.entry(key).or_default().push((face, t));
+        }
     }
     let mut places = Places::new(surface.positions.len());
     let mut primitives = vec![];
-    for (k, ((group, material), faces)) in faces.into_iter().enumerate() {
+    for (k, (key, faces)) in faces.into_iter().enumerate() {
         primitives.push(if faces.iter().all(|&(_, t)| has_texture_coordinates(light, t)) {
-            textured(light, group, material, &faces)
+            textured(light, key, &faces)
         } else {
             let mut vertices = vec![];
             let of_face = |(face, _): &Face| places.of_face(k, face, &mut vertices);
             let faces = faces.iter().map(of_face).collect();
-            Primitive { group, material, vertices, places: vec![], shown: None, faces }
+            let (group, material, is_double_sided) = key;
+            let (places, shown) = (vec![], None);
+            Primitive { group, material, is_double_sided, vertices, places, shown, faces }
         });
     }
     primitives
@@ -105,8 +116,7 @@ fn has_texture_coordinates(light: &GatheredMesh, t: usize) -> bool {
 /// The primitive of `faces`, each with its triangle of the scene.
 fn textured<'a>(
     light: &'a GatheredMesh,
-    group: u32,
-    material: u32,
+    (group, material, is_double_sided): Key,
     faces: &[Face],
 ) -> Primitive<'a> {
     let (surface, scene) = (&light.surface, light.mesh.scene());
@@ -129,5 +139,5 @@ fn textured<'a>(
         })
     };
     let faces = faces.iter().map(|(face, t)| face.map(|v| number(v, *t))).collect();
-    Primitive { group, material, vertices, places, shown, faces }
+    Primitive { group, material, is_double_sided, vertices, places, shown, faces }
 }

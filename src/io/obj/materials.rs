@@ -42,9 +42,10 @@ impl ObjFile<'_> {
             }
             if let Some(statement) = &mtl.textures[1]
                 && let Some(map) = map(statement)?
-                && !settings.emit.iter().any(|(name, _)| *name == material.name)
             {
-                let radiance = mtl.radiance.filter(is_not_black).unwrap_or(Rgb::ONE);
+                let given = settings.emit.iter().rfind(|(name, _)| *name == material.name);
+                let radiance = given.map(|(_, radiance)| *radiance);
+                let radiance = radiance.or(mtl.radiance.filter(is_not_black)).unwrap_or(Rgb::ONE);
                 let factor = PI * radiance.max(Rgb::ZERO);
                 let mean = factor * map.texture.whole_mean();
                 maps.exitance = Some(TextureMap { factor, mean, ..map });
@@ -297,7 +298,13 @@ impl MtlMaterial {
         }
         let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
         if let Some(specular) = specular {
-            reflectance = reflectance.min(Rgb::ONE - specular.share());
+            let share = specular.share();
+            if self.is_metal() {
+                reflectance = (reflectance - share).max(Rgb::ZERO);
+            } else if (reflectance + share).max_element() > 1.0 && !specular.is_glass() {
+                note(WarningKind::MoreThanAll, "`Kd` is limited to 1 - `Ks`".into())?;
+            }
+            reflectance = reflectance.min(Rgb::ONE - share);
         }
         if self.is_black(settings) {
             reflectance = Rgb::ZERO;

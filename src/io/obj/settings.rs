@@ -27,8 +27,12 @@ pub struct ObjSettings {
     pub strict: bool,
     /// Replacement of a reflectance of 1 or more in a channel, in [0, 1).
     pub max_reflectance: f64,
-    /// Materials by name, and the radiance that they emit per channel, whatever the file says.
+    /// Materials by name, and the radiance that they emit per channel, whatever the file says; it
+    /// is multiplied with an image of emitted light (`map_Ke`).
     pub emit: Vec<(String, Rgb)>,
+    /// Whether what emits does so on both sides of its faces, as in Blender, and not on its front
+    /// alone ([`Sides::Emitting`]).
+    pub emit_both_sides: bool,
     /// Materials by name that transmit light diffusely, and their transmittance per channel: the
     /// fraction of the light arriving on either side that leaves from the other. It is taken from
     /// the reflectance, texture included, as far as that suffices; a texture keeps at least a
@@ -123,6 +127,7 @@ impl Default for ObjSettings {
             strict: false,
             max_reflectance,
             emit,
+            emit_both_sides: false,
             transmit,
             sky: None,
             sides,

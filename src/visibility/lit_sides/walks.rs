@@ -85,12 +85,32 @@ impl<'a> Walks<'a> {
 
     /// The [`Sides`] of the material of triangle `t`, regardless of its position.
     fn sides_of_material(&self, t: usize) -> Sides {
-        self.sides[self.scene.triangles()[t].material as usize]
+        match self.sides[self.scene.triangles()[t].material as usize] {
+            // A black piece of its texture.
+            Sides::Emitting if self.scene.exitance(t) == Rgb::ZERO => Sides::Auto,
+            sides => sides,
+        }
     }
 
     /// Whether lamp `t` emits from its back; `None` if it is no lamp.
     pub fn shines_from_back(&self, t: usize) -> Option<bool> {
         self.shining_backs.get(&t).copied()
+    }
+
+    /// Whether triangle `t` emits.
+    pub fn is_lamp(&self, t: usize) -> bool {
+        self.shining_backs.contains_key(&t)
+    }
+
+    /// Whether `side` emits.
+    fn emits(&self, side: SideIndex) -> bool {
+        let (t, is_back) = (side / 2, side % 2 == 1);
+        self.shines_from_back(t).is_some_and(|back| back == is_back || self.shines_on_both(t))
+    }
+
+    /// Whether lamp `t` emits on both of its sides.
+    fn shines_on_both(&self, t: usize) -> bool {
+        self.sides_of(t) == Sides::Emitting
     }
 
     /// Whether lamp `t` is one of a pair of opposite sides of which the other suffices: light from
@@ -142,7 +162,7 @@ impl<'a> Walks<'a> {
             throughput *= self.passed(at, direction, at.distance(next.0));
             (at, side) = next;
             let (t, is_back) = (side / 2, side % 2 == 1);
-            if self.shines_from_back(t) == Some(is_back) {
+            if self.emits(side) {
                 return Some(throughput * self.scene.exitance(t).element_sum());
             }
             let material = self.scene.material(t);
@@ -192,13 +212,13 @@ impl<'a> Walks<'a> {
     }
 
     /// A cosine-distributed direction from a side.
-    fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
+    pub fn random_direction(&self, side: SideIndex, rng: &mut Rng) -> DVec3 {
         let turn = rng.f64();
         cosine_direction(self.normal(side), [rng.f64(), turn])
     }
 
     /// The hit of a ray from a point on a side, and the side that it hits.
-    fn next(&self, at: DVec3, side: SideIndex, direction: DVec3) -> Option<(DVec3, SideIndex)> {
+    pub fn next(&self, at: DVec3, side: SideIndex, direction: DVec3) -> Option<(DVec3, SideIndex)> {
         let hit = self.rays.closest_hit(at, direction, self.contact, Some(side / 2))?;
         Some((at + hit.distance * direction, 2 * hit.triangle + usize::from(!hit.front)))
     }
@@ -252,6 +272,7 @@ impl<'a> Walks<'a> {
         let (direction, distance) = to.normalize_and_length();
         let cosine = self.normal(side).dot(direction);
         let facing = -self.normal(2 * lamp + usize::from(self.shining_backs[&lamp])).dot(direction);
+        let facing = if self.shines_on_both(lamp) { facing.abs() } else { facing };
         // Below 1e-10 rounding decides whether a lamp in the point's own plane is visible. Negated,
         // so that NaN, for a point on the lamp, counts as not visible.
         if !(cosine > 1e-10 && facing > 1e-10) {

@@ -9,15 +9,19 @@ use radiosity::camera::RadianceImage;
 use radiosity::glam::DVec3;
 use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
 use radiosity::{
-    Backend, BakeResult, Camera, Error, ErrorKind, GatheredMesh, VertexMesh, write_exr, write_glb,
+    Backend, BakeResult, Camera, Error, GatheredMesh, VertexMesh, write_exr, write_glb,
 };
 
-use crate::args::{self, List, Names, Output, Parsed, give, numbers, some_of, value};
+use crate::args::{self, List, Names, Output, Parsed, give, numbers, some_of};
 use crate::bake::bands;
 use crate::progress;
+use crate::viewer_options::{ViewerOptions, is_lit};
 
 /// Rays along a pixel's side.
 pub const SAMPLES: u32 = 4;
+
+/// Pixels of the picture unless others are asked for.
+pub const IMAGE: [u32; 2] = [512, 512];
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,9 +59,8 @@ pub struct Files {
     /// [0,1,0] [default: chosen, and in the report]
     #[arg(long, value_name = "NUMBERS", value_parser = camera)]
     camera: Option<Camera>,
-    /// Factor of radiance for the colours of png, glb and ply [default: chosen, and in the report]
-    #[arg(long, value_name = "X", value_parser = value::<f64>("a number"))]
-    exposure: Option<f64>,
+    #[command(flatten)]
+    viewer: ViewerOptions,
     /// Pixels of the picture
     #[arg(long, value_name = "W,H", default_value = "512,512")]
     #[arg(value_parser = numbers::<u32, 2>("2 whole numbers with a comma between them"))]
@@ -83,13 +86,7 @@ impl Files {
     /// can be written, before any work is done for it.
     pub fn name_after(&mut self, scene: &Path) -> Result<(), Error> {
         self.output.name(scene.with_extension(""), &args::names(FORMATS))?;
-        if let Some(exposure) = self.exposure
-            && !(exposure > 0.0 && exposure.is_finite())
-        {
-            let place = format!("exposure {exposure}");
-            let remedy = "give a factor above 0, such as the one that a report names";
-            return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
-        }
+        self.viewer.check()?;
         let [width, height] = self.image;
         // The one that will be chosen is good; sizes are checked with any.
         let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
@@ -103,25 +100,22 @@ impl Files {
 
     /// Writes pictures and meshes, and tells how the picture was taken, if there is one.
     pub fn write(&self, baked: &BakeResult, device: &Backend) -> Result<Option<Picture>, Error> {
-        let (mut picture, mut tone) = (None, self.exposure.map(ToneCurve::with_exposure));
+        let mut picture = None;
+        let mut image = None;
         if self.writes(Format::Exr) || self.writes(Format::Png) {
             let camera = self.camera.unwrap_or_else(|| self.framing(baked));
-            let image = self.picture(&camera, baked, device)?;
-            let fitted = ToneCurve::fit_image(&image);
-            let shown = tone.unwrap_or(fitted);
-            // Where the picture is black, what it does not show has its own exposure.
-            if image.pixels.iter().any(|c| c.max_element() > 0.0) {
-                tone = Some(shown);
-            } else if baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0) {
+            let seen = self.picture(&camera, baked, device)?;
+            let any_lit = || baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0);
+            if !is_lit(&seen) && any_lit() {
                 eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
-            self.write_picture("", &image, &shown)?;
-            picture = Some(Picture { camera, exposure: shown.exposure() });
+            let tone = self.viewer.of_picture(&seen);
+            self.write_picture("", &seen, &tone)?;
+            picture = Some(Picture { camera, exposure: tone.exposure() });
+            image = Some(seen);
         }
-        let tone = match tone {
-            Some(tone) => tone.of_radiosity(),
-            None => ToneCurve::fit(&baked.light.surface.radiosity),
-        };
+        // Where the picture is black, what it does not show has its own exposure.
+        let tone = self.viewer.of_meshes(image.as_ref(), baked);
         self.write_meshes(baked, &tone)?;
         Ok(picture)
     }
@@ -161,7 +155,8 @@ impl Files {
             })?;
         }
         if self.writes(Format::Glb) {
-            let write = |path: &Path| write_glb(path, &baked.light, tone);
+            let settings = self.viewer.glb(tone, baked);
+            let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
             progress::of_writing(&self.output.path("glb"), write)?;
         }
         if self.elements {
@@ -181,7 +176,7 @@ impl Files {
         baked: &BakeResult,
         picture: Option<Picture>,
     ) -> Result<(), Error> {
-        let mut tone = self.exposure.map(ToneCurve::with_exposure);
+        let mut tone = self.viewer.given();
         // Bands that are no spectrum have no colours.
         if let (Some(Picture { camera, .. }), Ok(colours)) = (picture, light.colours()) {
             let mut coloured = baked.light.clone();

@@ -1,0 +1,66 @@
+//! How colours, axes and lengths of files for viewers are made.
+
+use clap::Args;
+use radiosity::camera::RadianceImage;
+use radiosity::io::{GlbSettings, ToneCurve};
+use radiosity::{BakeResult, Error, ErrorKind};
+
+use crate::args::{one_of, value};
+use crate::scene_options::UNITS;
+
+#[derive(Args)]
+pub struct ViewerOptions {
+    /// Factor of radiance for the colours of png, glb and ply [default: chosen, and in the report]
+    #[arg(long, value_name = "X", value_parser = value::<f64>("a number"))]
+    exposure: Option<f64>,
+    /// Unit of the scene's lengths, for glb, which has metres: mm, cm, m, in or ft
+    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = one_of(UNITS))]
+    unit: f64,
+}
+
+impl ViewerOptions {
+    /// # Errors
+    /// [`ErrorKind::Setting`] for an exposure that is no factor.
+    pub fn check(&self) -> Result<(), Error> {
+        if let Some(exposure) = self.exposure
+            && !(exposure > 0.0 && exposure.is_finite())
+        {
+            let place = format!("exposure {exposure}");
+            let remedy = "give a factor above 0, such as the one that a report names";
+            return Err(Error::new(ErrorKind::Setting, place, "out of range", remedy));
+        }
+        Ok(())
+    }
+
+    /// The curve of radiance for a picture: with the exposure that was given, else fitted to it.
+    pub fn of_picture(&self, image: &RadianceImage) -> ToneCurve {
+        self.given().unwrap_or_else(|| ToneCurve::fit_image(image))
+    }
+
+    /// The curve that was given.
+    pub fn given(&self) -> Option<ToneCurve> {
+        self.exposure.map(ToneCurve::with_exposure)
+    }
+
+    /// The curve of radiosity for meshes: that of a picture of them, unless it is black.
+    pub fn of_meshes(&self, image: Option<&RadianceImage>, baked: &BakeResult) -> ToneCurve {
+        let image = image.filter(|image| self.exposure.is_some() || is_lit(image));
+        match image.map(|image| self.of_picture(image)).or_else(|| self.given()) {
+            Some(tone) => tone.of_radiosity(),
+            None => ToneCurve::fit(&baked.light.surface.radiosity),
+        }
+    }
+
+    /// Settings of a GLB file of `baked`, in the colours of `tone`, a curve of radiosity.
+    pub fn glb(&self, tone: &ToneCurve, baked: &BakeResult) -> GlbSettings {
+        let mut settings = GlbSettings::from(tone);
+        settings.metres = self.unit;
+        settings.error = baked.estimate.total;
+        settings
+    }
+}
+
+/// Whether a picture shows any light.
+pub fn is_lit(image: &RadianceImage) -> bool {
+    image.pixels.iter().any(|c| c.max_element() > 0.0)
+}
