@@ -21,7 +21,7 @@
 //!   missed = μ + w (D − μ),   w = τ²/(τ² + s²),    variance = w s² + (1 − w)² var(μ)
 //! ```
 //!
-//! s² being the variance of D by the scatter of its paths. Where the light is good, τ is small and
+//! for each channel, s² being the variance of D by the scatter of its paths. Where the light is good, τ is small and
 //! few paths do; where it is not, w goes to 1 and the value to that of the paths alone. Points
 //! whose error is too large get twice as many paths until it is not.
 
@@ -29,12 +29,14 @@ mod shrinkage;
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::{GatherPoint, GatheredMesh, PointIrradiance, RadiosityField};
 use crate::light::PathTracer;
 use crate::progress::BatchSizer;
+use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
@@ -49,12 +51,12 @@ const MAX_PATHS: usize = 1 << 20;
 /// Values darker than this share of their mean are as exact as if they were that bright.
 const FLOOR: f64 = 0.05;
 
-/// Values at points, corrected.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What is known of values that paths have corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PathCorrection {
     /// Standard error that all values have in common, W/m² per channel: it is in the errors of
-    /// values, and in that of their mean as a whole.
+    /// values, and in that of their mean as a whole. Of harmonics that of the constant one.
     pub common_error: Rgb,
     /// Root mean square of the correction over that of values, lengths over the channels.
     pub correction: f64,
@@ -64,10 +66,24 @@ pub struct PathCorrection {
     pub is_reached: bool,
 }
 
-/// Corrects the irradiance `values` that `light` causes at `points` ([`crate::gather::irradiance_at`])
-/// by paths until 95 % of the values are estimated to be off by less than the share `error` of
-/// themselves: until their standard errors are half of that. These are standard errors against the
-/// true light of the scene then.
+/// A value of `N` numbers a channel, such as irradiance or its harmonics.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoisyValue<const N: usize> {
+    pub value: [Rgb; N],
+    pub variance: [Rgb; N],
+}
+
+impl<const N: usize> NoisyValue<N> {
+    /// The length of the value, over the channels and the numbers.
+    fn size(&self) -> f64 {
+        self.value.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
+    }
+}
+
+/// Corrects the irradiance `values` that `light` causes at `points`
+/// ([`irradiance_at`](crate::gather::irradiance_at)) by paths until 95 % of the values are estimated
+/// to be off by less than the share `error` of themselves: until their standard errors are half of
+/// that. These are standard errors against the true light of the scene then.
 ///
 /// Points inside solids are left out. The same points give the same bits on any number of threads.
 /// `progress` is called with the number of paths done and of those that will be at least, several
@@ -80,85 +96,129 @@ pub fn correct_by_paths(
     points: &[GatherPoint],
     values: &mut [PointIrradiance],
     error: f64,
+    progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<PathCorrection>, Error> {
+    let missing = MissingLight::new(light);
+    let open: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_buried()).collect();
+    let noisy = |&k: &usize| NoisyValue {
+        value: [values[k].irradiance],
+        variance: [values[k].standard_error.map(|x| x * x)],
+    };
+    let mut corrected: Vec<NoisyValue<1>> = open.iter().map(noisy).collect();
+    let sample = |j: usize, path: usize| [missing.irradiance(&points[open[j]], path)];
+    let correction = correct(&mut corrected, error, sample, progress)?;
+    for (k, corrected) in open.into_iter().zip(corrected) {
+        // Irradiance is not negative, and its correction is noisy.
+        values[k].irradiance = corrected.value[0].max(Rgb::ZERO);
+        values[k].standard_error = corrected.variance[0].map(f64::sqrt);
+    }
+    Ok(correction)
+}
+
+/// Corrects `values` by what each misses: `sample` gives that of a value by the number of a path,
+/// without bias. See [`correct_by_paths`] for `error` and `progress`.
+///
+/// # Errors
+/// [`ErrorKind::Setting`] for an `error` that is not above 0.
+pub(crate) fn correct<const N: usize>(
+    values: &mut [NoisyValue<N>],
+    error: f64,
+    sample: impl Fn(usize, usize) -> [Rgb; N] + Sync,
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<Option<PathCorrection>, Error> {
-    if !(error > 0.0) {
+    if error.is_nan() || error <= 0.0 {
         let remedy = "give a share above 0, such as 0.05";
         return Err(Error::new(ErrorKind::Setting, "error of values", error.to_string(), remedy));
     }
-    let tracer = PathTracer::of_shared(light.mesh.shared_scene());
-    let field = light.radiosity_field();
-    let counts: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_buried()).collect();
-    let mut missed = vec![Missed::default(); counts.len()];
-    let scale = mean_length(counts.iter().map(|&k| values[k].irradiance));
-    let allowed = |k: usize| 0.5 * error * values[k].irradiance.length().max(FLOOR * scale);
-    let mut open: Vec<usize> = (0..counts.len()).collect();
-    let mut paths = FIRST_PATHS;
-    let (mut done, mut of) = (0, 0);
+    let mean = values.iter().map(NoisyValue::size).sum::<f64>() / (values.len() as f64).max(1.0);
+    let allowed: Vec<f64> =
+        values.iter().map(|v| (0.5 * error * v.size().max(FLOOR * mean)).powi(2)).collect();
+    let mut missed = vec![Missed::default(); values.len()];
+    let mut open: Vec<usize> = (0..values.len()).collect();
+    let (mut paths, mut done) = (FIRST_PATHS, 0);
     let estimate = loop {
-        of += open.iter().map(|&j| paths - missed[j].paths).sum::<usize>();
+        let to_do: usize = open.iter().map(|&k| paths - missed[k].paths).sum();
+        let all = done + to_do;
         let (mut remaining, mut batches) = (&open[..], BatchSizer::new(16));
         while !remaining.is_empty() {
             let traced = batches.next(&mut remaining, |batch| {
-                let trace = |&j: &usize| {
-                    let more = missed[j].more(paths, &mut |first| {
-                        sample(&tracer, &field, &points[counts[j]], first)
-                    });
-                    (j, more)
-                };
+                let trace = |&k: &usize| (k, missed[k].more(paths, |path| sample(k, path)));
                 batch.par_iter().map(trace).collect::<Vec<_>>()
             });
-            for (j, more) in traced {
-                done += more.paths - missed[j].paths;
-                missed[j] = more;
+            for (k, more) in traced {
+                done += more.paths - missed[k].paths;
+                missed[k] = more;
             }
-            if progress(done, of).is_break() {
+            if progress(done, all).is_break() {
                 return Ok(None);
             }
         }
         let estimate = Shrinkage::new(&missed);
-        let is_open = |&j: &usize| {
-            let gathered = values[counts[j]].standard_error.length_squared();
-            let error = (gathered + estimate.variance(&missed[j]).element_sum()).sqrt();
-            error > allowed(counts[j])
+        let is_open = |&k: &usize| {
+            let variances = values[k].variance.iter().zip(estimate.variance(&missed[k]));
+            variances.map(|(a, b)| (*a + b).element_sum()).sum::<f64>() > allowed[k]
         };
-        open = (0..counts.len()).filter(is_open).collect();
-        if open.is_empty() || 2 * paths > MAX_PATHS {
+        open = (0..values.len()).filter(is_open).collect();
+        if open.is_empty() || paths == MAX_PATHS {
             break estimate;
         }
         paths *= 2;
-        // Points that were done before have fewer.
-        open.retain(|&j| missed[j].paths < paths);
     };
     let mut squares = [0.0; 2];
-    for (&k, missed) in counts.iter().zip(&missed) {
-        let (correction, value) = (estimate.missed(missed), &mut values[k]);
-        squares[0] += correction.length_squared();
-        squares[1] += value.irradiance.length_squared();
-        // Irradiance is not negative, and its correction is noisy.
-        value.irradiance = (value.irradiance + correction).max(Rgb::ZERO);
-        let variance = value.standard_error * value.standard_error + estimate.variance(missed);
-        value.standard_error = variance.map(f64::sqrt);
+    for (value, missed) in values.iter_mut().zip(&missed) {
+        let (correction, variance) = (estimate.missed(missed), estimate.variance(missed));
+        squares[0] += correction.iter().map(|c| c.length_squared()).sum::<f64>();
+        squares[1] += value.size().powi(2);
+        for j in 0..N {
+            value.value[j] += correction[j];
+            value.variance[j] += variance[j];
+        }
     }
     Ok(Some(PathCorrection {
-        common_error: estimate.common_variance().map(f64::sqrt),
+        common_error: estimate.common_variance()[0].map(f64::sqrt),
         correction: if squares[1] > 0.0 { (squares[0] / squares[1]).sqrt() } else { 0.0 },
         paths: done,
         is_reached: open.is_empty(),
     }))
 }
 
-/// What the light misses at `point` by path number `path`, W/m².
-fn sample(tracer: &PathTracer, field: &RadiosityField, point: &GatherPoint, path: usize) -> Rgb {
-    let [x, y, z] = point.position.to_array().map(f64::to_bits);
-    let [u, v, w] = point.normal.to_array().map(f64::to_bits);
-    let mut rng = random_numbers(&[x, y, z, u, v, w, path as u64]);
-    let GatherPoint { position, normal, near } = *point;
-    let known = |hit: &Hit| field.reflected_at(hit.triangle, hit.u, hit.v);
-    tracer.missed(position, normal, near, known, &mut rng)
+/// The light that a field misses.
+pub(crate) struct MissingLight<'a> {
+    tracer: PathTracer<'static>,
+    field: RadiosityField<'a>,
 }
 
-fn mean_length(values: impl Iterator<Item = Rgb>) -> f64 {
-    let (count, sum) = values.fold((0, 0.0), |(count, sum), v| (count + 1, sum + v.length()));
-    sum / f64::from(count).max(1.0)
+impl MissingLight<'_> {
+    pub fn new(light: &GatheredMesh) -> MissingLight<'_> {
+        let tracer = PathTracer::of_shared(light.mesh.shared_scene());
+        MissingLight { tracer, field: light.radiosity_field() }
+    }
+
+    /// Irradiance that is missed at `point`, by path number `path`, W/m².
+    fn irradiance(&self, point: &GatherPoint, path: usize) -> Rgb {
+        let GatherPoint { position, normal, near } = *point;
+        let mut rng = numbers_of(position, normal, path);
+        let direction = cosine_direction(normal, [rng.f64(), rng.f64()]);
+        self.radiosity(position, direction, near, &mut rng)
+    }
+
+    /// What is missed of the radiosity that is seen from `position` along unit `direction`, further
+    /// than `near`, by one path, W/m².
+    pub fn radiosity(
+        &self,
+        position: DVec3,
+        direction: DVec3,
+        near: f64,
+        rng: &mut fastrand::Rng,
+    ) -> Rgb {
+        let known = |hit: &Hit| self.field.reflected_at(hit.triangle, hit.u, hit.v);
+        self.tracer.missed(position, direction, near, known, rng)
+    }
+}
+
+/// Random numbers of path number `path` from `position`, the same in any list of points.
+pub(crate) fn numbers_of(position: DVec3, normal: DVec3, path: usize) -> fastrand::Rng {
+    let [x, y, z] = position.to_array().map(f64::to_bits);
+    let [u, v, w] = normal.to_array().map(f64::to_bits);
+    random_numbers(&[x, y, z, u, v, w, path as u64])
 }

@@ -16,16 +16,19 @@
 mod harmonics;
 mod probe_grid;
 
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, IrradianceSample};
+use crate::path_correction::{MissingLight, NoisyValue, PathCorrection, correct, numbers_of};
 use crate::progress::BatchSizer;
+use crate::scene::Rgb;
 use crate::visibility::{buried, offset};
-use harmonics::DIRECTIONS;
 pub use harmonics::Harmonics;
+use harmonics::{COUNT, DIRECTIONS};
 pub use probe_grid::ProbeGrid;
 
 /// Irradiance at a point from all sides.
@@ -37,8 +40,8 @@ pub struct Probe {
     pub irradiance: Harmonics,
     /// Error of `irradiance`, W/m²: the root mean square over all normals, a length over the
     /// channels, of its difference from the values gathered in 26 directions. It includes the
-    /// harmonics above order 2 and the noise of the gathers, but not the error of the gathered
-    /// light itself.
+    /// harmonics above order 2 and the noise of the gathers; the error of the gathered light itself
+    /// is in it after [`correct_probes`].
     pub deviation: f64,
     /// Fraction of all directions in which nothing is seen, in [0, 1].
     pub escaped: f64,
@@ -96,8 +99,7 @@ pub fn probes_at(
 ) -> Result<Option<Vec<Probe>>, Error> {
     check(positions, size)?;
     let field = light.radiosity_field();
-    let near = (offset::SURFACE_LIFT * size).max(offset::min_lift(light.mesh.scene()));
-    let near = near * offset::NEAR_OF_LIFT;
+    let near = near(light, size);
     let mut probes = Vec::with_capacity(positions.len());
     let mut remaining = positions;
     let mut batches = BatchSizer::new(16);
@@ -119,6 +121,54 @@ pub fn probes_at(
     Ok(Some(probes))
 }
 
+/// Corrects `probes`, made by [`probes_at`] of `light` with this `size`, by paths until 95 % of them
+/// are estimated to be off by less than the share `error`, root mean square over all normals, by
+/// harmonics to order 2: see [`path_correction`](crate::path_correction). Deviations are those from
+/// the true light then.
+///
+/// # Errors
+/// [`ErrorKind::Setting`] for a size or an `error` that is not above 0.
+pub fn correct_probes(
+    light: &GatheredMesh,
+    probes: &mut [Probe],
+    size: f64,
+    error: f64,
+    progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<PathCorrection>, Error> {
+    check(&[], size)?;
+    let (missing, near) = (MissingLight::new(light), near(light, size));
+    let open: Vec<usize> = (0..probes.len()).filter(|&k| !probes[k].is_inside()).collect();
+    let noisy = |&k: &usize| NoisyValue {
+        value: probes[k].irradiance.coefficients,
+        variance: [Rgb::ZERO; COUNT],
+    };
+    let mut corrected: Vec<NoisyValue<COUNT>> = open.iter().map(noisy).collect();
+    let sample = |j: usize, path: usize| {
+        let position = probes[open[j]].position;
+        let mut rng = numbers_of(position, DVec3::ZERO, path);
+        let direction = harmonics::uniform_direction([rng.f64(), rng.f64()]);
+        let radiosity = missing.radiosity(position, direction, near, &mut rng);
+        // Radiance B/π, of a density of 1/4π.
+        Harmonics::irradiance_of_direction(direction, 4.0 * radiosity).coefficients
+    };
+    let correction = correct(&mut corrected, error, sample, progress)?;
+    if correction.is_some() {
+        for (k, NoisyValue { value, variance }) in open.into_iter().zip(corrected) {
+            probes[k].irradiance.coefficients = value;
+            // The mean over the sphere of |Σ c_i Y_i|².
+            let square = variance.iter().map(|v| v.element_sum()).sum::<f64>() / (4.0 * PI);
+            probes[k].deviation = probes[k].deviation.hypot(square.sqrt());
+        }
+    }
+    Ok(correction)
+}
+
+/// Distance within which a probe of this `size` sees nothing, scene unit.
+fn near(light: &GatheredMesh, size: f64) -> f64 {
+    let lift = (offset::SURFACE_LIFT * size).max(offset::min_lift(light.mesh.scene()));
+    lift * offset::NEAR_OF_LIFT
+}
+
 fn check(positions: &[DVec3], size: f64) -> Result<(), Error> {
     if !(size.is_finite() && size > 0.0) {
         let remedy = "give a length above 0";
@@ -137,7 +187,6 @@ fn check(positions: &[DVec3], size: f64) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Rgb;
 
     /// A probe that gathers `irradiance` of the unit normal.
     fn probe(mut irradiance: impl FnMut(DVec3) -> Rgb) -> Probe {

@@ -28,7 +28,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ),
     ("path_correction", "error gather light progress sampling scene visibility"),
     ("grid", "error gather geometry path_correction scene visibility"),
-    ("probe", "error gather progress scene visibility"),
+    ("probe", "error gather path_correction progress scene visibility"),
     ("view_factor", "error form_factor geometry ranks sampling scene visibility"),
     ("heat", "error geometry linear view_factor"),
     (

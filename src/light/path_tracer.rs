@@ -217,22 +217,21 @@ impl<'a> PathTracer<'a> {
         (reflected, None)
     }
 
-    /// What the surfaces seen from `position`, with this unit `normal`, reflect to it beyond what
-    /// is `known` of them: irradiance by one path, W/m², unbiased. Light that they emit is not in
-    /// it, nor is what is nearer than `near`.
+    /// What the surface that is seen from `position` along unit `direction`, further than `near`,
+    /// reflects beyond what is `known` of it: radiosity by one path, as it arrives, W/m², unbiased.
+    /// Light that it emits is not in it.
     pub(crate) fn missed(
         &self,
         position: DVec3,
-        normal: DVec3,
+        direction: DVec3,
         near: f64,
         known: impl Fn(&Hit) -> Rgb,
         rng: &mut Rng,
     ) -> Rgb {
-        let (direction, _) = cosine_weighted(normal, rng);
         let hit = self.first_hit(position, direction, near, None);
         let Some(hit) = hit.filter(|hit| hit.front) else { return Rgb::ZERO };
-        let passed =
-            self.panes.transmittance(position, direction, near..hit.distance - self.contact);
+        let between = near..hit.distance - self.contact;
+        let passed = self.panes.transmittance(position, direction, between);
         let at = position + hit.distance * direction;
         let (reflected, _) = self.path_to(&hit, at, true, |_| false, rng);
         passed * (reflected - known(&hit))

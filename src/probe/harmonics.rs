@@ -36,12 +36,17 @@ impl Harmonics {
     /// The radiance, W/(m² sr), whose irradiance this is: L_lm = E_lm / Â_l.
     pub fn radiance_of_irradiance(&self) -> Harmonics {
         let mut coefficients = self.coefficients;
-        let [zero, one, two] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
-        // Â_l = π, 2π/3, π/4 of order l (Ramamoorthi and Hanrahan 2001, equation 8).
-        let lobe = [zero, one, one, one, two, two, two, two, two];
-        for (c, factor) in coefficients.iter_mut().zip(lobe) {
+        for (c, factor) in coefficients.iter_mut().zip(COSINE_LOBE) {
             *c /= factor;
         }
+        Harmonics { coefficients }
+    }
+
+    /// The irradiance of radiance that arrives along `direction` (towards its source, unit length)
+    /// alone, by its integral over directions, W/m²: E_lm = Â_l Y_lm.
+    pub(super) fn irradiance_of_direction(direction: DVec3, radiance: Rgb) -> Harmonics {
+        let basis = basis(direction);
+        let coefficients = std::array::from_fn(|k| radiance * (COSINE_LOBE[k] * basis[k]));
         Harmonics { coefficients }
     }
 
@@ -60,6 +65,20 @@ impl Harmonics {
         }
         harmonics
     }
+}
+
+/// Â_l = π, 2π/3, π/4 of order l (Ramamoorthi and Hanrahan 2001, equation 8).
+const COSINE_LOBE: [f64; COUNT] = {
+    let [zero, one, two] = [PI, 2.0 * PI / 3.0, FRAC_PI_4];
+    [zero, one, one, one, two, two, two, two, two]
+};
+
+/// A point of the unit square as a direction, uniform over the sphere.
+pub(super) fn uniform_direction([height, turn]: [f64; 2]) -> DVec3 {
+    let z = 1.0 - 2.0 * height;
+    let (sine, cosine) = (2.0 * PI * turn).sin_cos();
+    let across = (1.0 - z * z).max(0.0).sqrt();
+    DVec3::new(across * cosine, across * sine, z)
 }
 
 /// Y_lm in unit direction `n`.

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::gather::{GatherPoint, irradiance_at};
-use radiosity::probe::{Probe, ProbeGrid, probes_at};
+use radiosity::probe::{Probe, ProbeGrid, correct_probes, probes_at};
 use radiosity::scene::Aabb;
 use radiosity::{Backend, BakeSettings, ErrorKind, GatheredMesh, Mesh, Rgb, Scene};
 
@@ -43,6 +43,38 @@ fn furnace_has_constant_harmonics() {
             assert!(probe.deviation < 2.0 * tolerance, "{}", probe.deviation);
         }
     }
+}
+
+/// A cube whose walls emit 1 and reflect half, in light that lacks 0.3 of the reflected radiosity of
+/// 1 at one end and nothing at the other: by paths, irradiance is 2 whatever the normal, to the
+/// error that is stated.
+#[test]
+fn paths_correct_probes_in_light_that_is_wrong() {
+    let mesh = Mesh::new(cube(&paint(0.5, 1.0)), 0.2).unwrap();
+    let told = |e: usize| Rgb::splat(1.7 + 0.3 * mesh.centroid(mesh.element(e)).x);
+    let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(told).collect();
+    let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+    let positions: Vec<DVec3> = (0..64)
+        .map(|k| DVec3::new(f64::from(k % 4), f64::from(k / 4 % 4), f64::from(k / 16)))
+        .collect();
+    let positions: Vec<DVec3> = positions.iter().map(|p| 0.2 + 0.2 * p).collect();
+    let mut found = probes(&light, 0.01, &positions);
+    let error = 0.02;
+    let correct = correct_probes(&light, &mut found, 0.1, error, keep_counting).unwrap().unwrap();
+    assert!(correct.is_reached && correct.correction > 0.05, "{correct:?}");
+    let (mut squares, mut stated) = (0.0, 0.0);
+    for probe in &found {
+        let [constant, others @ ..] = probe.irradiance.coefficients;
+        // The constant 2, a length over the channels; the mean over the sphere is that over 4π.
+        let off = (constant - 2.0 * (4.0 * PI).sqrt()).length_squared();
+        let off = (off + others.iter().map(|c| c.length_squared()).sum::<f64>()) / (4.0 * PI);
+        assert!(off.sqrt() < error * 2.0 * 3f64.sqrt(), "{probe:?}");
+        squares += off;
+        stated += probe.deviation.powi(2);
+    }
+    // `deviation` has the noise of gathers once more than it is in the coefficients.
+    let ratio = (squares / stated).sqrt();
+    assert!(ratio > 0.3 && ratio < 1.1, "{ratio}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use radiosity::glam::DVec3;
-use radiosity::probe::{Probe, ProbeGrid, probes_at};
+use radiosity::probe::{Probe, ProbeGrid, correct_probes, probes_at};
 use radiosity::scene::Aabb;
 use radiosity::{Error, Scene};
 use serde_json::json;
@@ -57,14 +57,20 @@ impl Options {
         let scene = self.light.scene(&self.scene)?;
         let grid = self.grid(&scene)?;
         let light = self.light.bake(scene)?;
-        let probes = self.gather(&grid, &light)?.ok_or(Stop::Interrupted)?;
+        let mut probes = self.gather(&grid, &light)?.ok_or(Stop::Interrupted)?;
+        let (lit, size, error) = (&light.baked.light, grid.size(), self.light.error());
+        let correction = progress::of_stoppable("paths", |report| {
+            correct_probes(lit, &mut probes, size, error, report)
+        })?;
+        let is_reached = correction.ok_or(Stop::Interrupted)?.is_reached;
         let inside = probes.iter().filter(|probe| probe.is_inside()).count();
         let [x, y, z] = grid.counts;
         say!("{} probes, {x} by {y} by {z}, {inside} of them inside of something", probes.len());
         self.output.write("probes.json", &json(&grid, &probes))?;
         self.output.write("probes.csv", &csv(&probes))?;
         progress::print_written();
-        args::end()
+        self.light.print_outcome(is_reached);
+        args::end_at(is_reached)
     }
 
     fn grid(&self, scene: &Scene) -> Result<ProbeGrid, Error> {
