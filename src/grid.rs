@@ -169,6 +169,18 @@ impl MeasuredGrid {
         Ok(correction)
     }
 
+    /// Root mean square of the standard errors over the values, lengths over the channels, of the
+    /// points outside of solids; 0 if there are none.
+    pub fn relative_error(&self) -> f64 {
+        let values = self.values.iter().flatten().filter(|value| !value.is_buried());
+        let squares = values.filter_map(|value| {
+            let size = value.irradiance.length_squared();
+            (size > 0.0).then(|| value.standard_error.length_squared() / size)
+        });
+        let (count, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
+        if count > 0 { (sum / f64::from(count)).sqrt() } else { 0.0 }
+    }
+
     /// Values of `quantity` at the points outside of solids, in their order, with standard errors.
     pub fn measured(&self, quantity: Quantity) -> impl Iterator<Item = Option<[f64; 2]>> {
         self.values.iter().map(move |value| {

@@ -42,8 +42,12 @@ use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 use shrinkage::{Missed, Shrinkage};
 
-/// Paths of a point in the first round. Fewer leave the scatter of a point's paths unknown.
-const FIRST_PATHS: usize = 256;
+/// Paths of all points in the first round: bring what they miss in common to 1 % of itself where
+/// paths scatter by 2.5 times their mean.
+const FIRST_PATHS: usize = 1 << 16;
+
+/// Minimum and maximum of those of a point. Fewer leave the scatter of its paths unknown.
+const FIRST_PATHS_OF_POINT: [usize; 2] = [16, 256];
 
 /// Maximum number of paths of a point: brings a scatter of ten times the mean to 1 % of it.
 const MAX_PATHS: usize = 1 << 20;
@@ -130,12 +134,15 @@ pub(crate) fn correct<const N: usize>(
         let remedy = "give a share above 0, such as 0.05";
         return Err(Error::new(ErrorKind::Setting, "error of values", error.to_string(), remedy));
     }
+    moderate(values);
     let mean = values.iter().map(NoisyValue::size).sum::<f64>() / (values.len() as f64).max(1.0);
     let allowed: Vec<f64> =
         values.iter().map(|v| (0.5 * error * v.size().max(FLOOR * mean)).powi(2)).collect();
     let mut missed = vec![Missed::default(); values.len()];
     let mut open: Vec<usize> = (0..values.len()).collect();
-    let (mut paths, mut done) = (FIRST_PATHS, 0);
+    let [least, most] = FIRST_PATHS_OF_POINT;
+    let first = (FIRST_PATHS / values.len().max(1)).clamp(least, most);
+    let (mut paths, mut done) = (first.next_power_of_two(), 0);
     let estimate = loop {
         let to_do: usize = open.iter().map(|&k| paths - missed[k].paths).sum();
         let all = done + to_do;
@@ -180,6 +187,25 @@ pub(crate) fn correct<const N: usize>(
         paths: done,
         is_reached: open.is_empty(),
     }))
+}
+
+/// Draws the variances of `values` half-way to their mean, relative to the values: each is that of
+/// few gathers, three degrees of freedom, and counts as much as a prior of three from all of them
+/// (Smyth 2004, equation 7).
+fn moderate<const N: usize>(values: &mut [NoisyValue<N>]) {
+    let square = |v: &NoisyValue<N>| v.size().powi(2).max(f64::MIN_POSITIVE);
+    let relative = |v: &NoisyValue<N>| v.variance.map(|variance| variance / square(v));
+    let mut mean = [Rgb::ZERO; N];
+    for value in values.iter() {
+        let share = relative(value).map(|variance| variance / values.len() as f64);
+        mean.iter_mut().zip(share).for_each(|(mean, share)| *mean += share);
+    }
+    for value in values {
+        let all = square(value);
+        for (variance, mean) in value.variance.iter_mut().zip(&mean) {
+            *variance = 0.5 * (*variance + *mean * all);
+        }
+    }
 }
 
 /// The light that a field misses.

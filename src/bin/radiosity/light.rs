@@ -33,11 +33,6 @@ impl LightOptions {
         self.error
     }
 
-    /// The noise that what is measured may have, as a share of it.
-    pub fn noise(&self) -> f64 {
-        (0.25 * self.error).min(1.0)
-    }
-
     /// Says whether the error that was asked for is reached.
     pub fn print_outcome(&self, is_reached: bool) {
         // In the digits that it was asked in.

@@ -180,8 +180,8 @@ impl Options {
             total - texels
         );
         progress::print_written();
-        self.print_shown(shown, &baked);
-        Ok(())
+        let is_reached = self.print_shown(shown, &baked);
+        args::end_at(is_reached)
     }
 
     /// How far to bake.
@@ -282,9 +282,9 @@ impl Options {
         Ok(shown)
     }
 
-    /// Says whether the map shows what was asked for.
-    fn print_shown(&self, shown: Option<Estimate>, baked: &BakeResult) {
-        let Some(shown) = shown else { return };
+    /// Says whether the map shows what was asked for, and gives it.
+    fn print_shown(&self, shown: Option<Estimate>, baked: &BakeResult) -> bool {
+        let Some(shown) = shown else { return true };
         // In the digits that it was asked in.
         let asked = (100.0 * self.error()) as f32;
         let of_light = baked.estimate.of_light();
@@ -297,6 +297,7 @@ impl Options {
             };
             say!("{asked} % missed: the map shows {}; {remedy}", said(&shown));
         }
+        shown.value <= self.error()
     }
 
     fn write(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {
