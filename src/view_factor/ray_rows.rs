@@ -150,7 +150,7 @@ impl<'a> RayCaster<'a> {
 
     /// Calls `meets` with start, direction and hit of each of these rays of polygon `s` that hits
     /// something.
-    fn cast(&self, s: u32, rays: Range<u32>, meets: impl FnMut(DVec3, DVec3, &Hit)) {
+    pub fn cast(&self, s: u32, rays: Range<u32>, meets: impl FnMut(DVec3, DVec3, &Hit)) {
         self.cast_set(s, rays, u64::from(s) << 32, meets);
     }
 
