@@ -1,6 +1,6 @@
 //! Whose backs a group sees, by rays: for messages.
 
-use super::ray_rows::RayCaster;
+use super::ray_rows::{Half, RayCaster};
 use super::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
 use crate::scene::Scene;
@@ -40,7 +40,7 @@ pub fn backs_met(scene: &Scene, two_sided: &[usize], from: usize) -> Result<Vec<
     let mut areas = vec![0.0; scene.groups().len()];
     for s in polygons {
         let per_ray = fronts.polygons[s as usize].area / f64::from(rays);
-        caster.cast(s, 0..rays, |_, _, hit| {
+        caster.cast(s, Half::First, rays, |_, _, hit| {
             if fronts.met(hit.triangle, hit.front).is_none() {
                 areas[scene.triangles()[hit.triangle].group as usize] += per_ray;
             }

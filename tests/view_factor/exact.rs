@@ -153,7 +153,7 @@ fn hidden_is_zero_and_backs_are_counted() {
 
 #[test]
 fn backs_have_names_of_their_own() {
-    let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+    let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
     let groups = names(&["fin", "fin (back)", "(fin (back))", "a"]);
     // In the order of the groups, each once.
     let rows = MatrixRows::new(&groups, &[3, 0, 0]);
