@@ -31,6 +31,7 @@ pub struct LuminaireOptions {
     luminaires: Vec<PathBuf>,
     /// Set of lamps, from 1, of EULUMDAT files with several, which are alternatives
     #[arg(long, value_name = "N", value_parser = value::<usize>("a whole number from 1"))]
+    #[arg(hide = true)]
     lamp_set: Option<usize>,
     /// Metres in the scene's unit, for luminaires: 0.001 for millimetres
     #[arg(long, value_name = "METRES", default_value = "1", value_parser = metres)]

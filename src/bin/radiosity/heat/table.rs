@@ -50,8 +50,11 @@ pub struct Numbers {
     sign: DecimalSign,
 }
 
-/// The error of something in a table.
+/// The error of something in a table, which is shown without control characters, and not at any
+/// length.
 pub fn wrong(place: &str, found: impl Into<String>, remedy: impl Into<String>) -> Error {
+    let plain = |c: char| if c.is_control() { ' ' } else { c };
+    let found: String = found.into().chars().map(plain).take(300).collect();
     Error::new(ErrorKind::File, place, found, remedy)
 }
 
