@@ -239,3 +239,14 @@ fn surroundings_have_a_scale() {
         assert!(words.iter().all(|word| error.contains(word)), "{option}: {error}");
     }
 }
+
+#[test]
+fn oddities_of_the_scene_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    // A face without area.
+    let text = format!("{TWO_SQUARES}f 5 5 6\n");
+    let scene = write(folder.path(), "odd.obj", &text);
+    let known = "group,temperature,emissivity\n*,300,1\n";
+    let (_, [_, warned]) = heat(scene.to_str().unwrap(), known, &[]);
+    assert!(warned.contains("warning: 1 "), "{warned}");
+}

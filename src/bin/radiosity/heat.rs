@@ -34,7 +34,7 @@ Columns of --boundaries, in any order, with , ; or tabs between them, and decima
                two-sided group the mean over both sides
   emissivity   0 to 1; with --bands a column a band: emissivity_1, …")]
 pub struct Options {
-    /// Scene, an OBJ file, or view factors, an npz file
+    /// Scene, an OBJ or STL file, or view factors, an npz file
     #[arg(value_name = "SCENE.obj|FACTORS.npz")]
     input: PathBuf,
     /// Boundary conditions of the groups, a CSV file

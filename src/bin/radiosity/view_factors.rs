@@ -34,7 +34,7 @@ arrives at the backs of surfaces. A group of --two-sided has two rows and column
 front, and GROUP (back). Where a group is called `open`, `back` or `area`, it is the table's own \
 column that is called (open), (back) or (area).")]
 pub struct Options {
-    /// Scenes, OBJ files
+    /// Scenes, OBJ or STL files
     #[arg(value_name = "SCENE.obj", required = true)]
     scenes: Vec<PathBuf>,
     #[command(flatten)]
@@ -82,13 +82,21 @@ pub struct ToError {
 }
 
 impl ToError {
-    /// The scene of an OBJ file, in which mirrors and glass are surfaces as all others are.
+    /// The scene of a file, in which mirrors and glass are surfaces as all others are. Prints what
+    /// was odd about it.
     pub fn scene(&self, path: &Path) -> Result<Scene, Error> {
         let mut obj = ObjSettings::default();
         obj.specular = SpecularSurfaces::Ignore;
         obj.facets = self.facets;
         obj.strict = self.strict;
-        progress::of_reading(path, || obj.load(path))
+        let scene = progress::of_reading(path, || obj.load(path))?;
+        let of_light = |w: &&Warning| {
+            matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
+        };
+        for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
+            eprintln!("warning: {warning}");
+        }
+        Ok(scene)
     }
 
     /// Whether some group has two sides.
@@ -149,12 +157,6 @@ impl Options {
         let scene = self.to_error.scene(path)?;
         let groups = self.to_error.matrix_rows(&scene)?.names.len();
         let formats = self.matrix.formats_for(groups, &stem)?;
-        let of_light = |w: &&Warning| {
-            matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
-        };
-        for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
-            eprintln!("warning: {warning}");
-        }
         if let Some(rows) = &self.rows {
             return self.to_error.write_rows(&scene, rows.clone(), &stem);
         }
