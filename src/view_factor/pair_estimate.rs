@@ -49,8 +49,8 @@ pub(super) struct PairEstimator<'a> {
 }
 
 impl PairEstimator<'_> {
-    /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, by halves, with a standard
-    /// error of about `tolerance`, in squares of the scene's unit.
+    /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, by halves, with a
+    /// standard error of about `tolerance`, in squares of the scene's unit.
     pub fn exchange(
         &self,
         [s, t]: [u32; 2],

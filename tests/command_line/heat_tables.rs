@@ -86,8 +86,8 @@ fn names_in_other_encodings_are_the_scenes() {
 fn degrees_celsius_are_named_or_asked_for() {
     let celsius =
         "group,temperature,emissivity\nATTIC FLOOR,27,0.9\nROOF SOUTH,67,0.85\n*,47,0.9\n";
-    let kelvin = "group,temperature [K],emissivity\nATTIC FLOOR,300.15,0.9\nROOF SOUTH,340.15,0.85\n\
-         *,320.15,0.9\n";
+    let kelvin = "group,temperature [K],emissivity\nATTIC FLOOR,300.15,0.9\nROOF SOUTH,340.15,\
+         0.85\n*,320.15,0.9\n";
     let expected = results(kelvin.as_bytes(), &[]).unwrap();
     let error = results(celsius.as_bytes(), &[]).unwrap_err();
     for word in [

@@ -26,9 +26,9 @@ struct Known {
 /// `scale` is that of temperatures, where the header names no unit.
 ///
 /// # Errors
-/// [`radiosity::ErrorKind::File`] where it cannot be read, with its line where something is wrong with one,
-/// for temperatures that may be in kelvin or in degrees Celsius, and for groups that it does not
-/// name, or that are not there.
+/// [`radiosity::ErrorKind::File`] where it cannot be read, with its line where something is wrong
+/// with one, for temperatures that may be in kelvin or in degrees Celsius, and for groups that it
+/// does not name, or that are not there.
 pub fn read(
     path: &Path,
     rows: &MatrixRows,
