@@ -11,6 +11,9 @@
 //! given, or the net flux out q = Σ ε (M − H), and the temperature is computed; an adiabatic group
 //! has q = 0.
 //!
+//! A two-sided group is a sheet without thickness: each side has its own radiosity and irradiance
+//! (a row of the matrix), both have one temperature, and q is the mean over both sides.
+//!
 //! ```text
 //! ViewFactors ─→ one linear system (GMRES) where there is one band or no flux is given
 //!             └→ Newton's method around it, in the temperatures of groups with given flux, else
@@ -18,6 +21,7 @@
 
 mod balance;
 mod black_body;
+mod bodies;
 mod exchange;
 mod surface;
 mod undetermined;
@@ -25,16 +29,17 @@ mod undetermined;
 use std::ops::ControlFlow;
 
 use crate::error::{Error, ErrorKind};
-use crate::view_factor::ViewFactors;
+use crate::view_factor::{ViewFactors, are_sides};
 use exchange::Exchange;
-use surface::is_temperature;
+use surface::{is_temperature, of_group};
 
 pub use balance::{GroupHeat, HeatBalance};
 pub use black_body::{STEFAN_BOLTZMANN, share_below};
 pub use surface::{Boundary, HeatSettings, Surface};
 
 impl HeatBalance {
-    /// Solves for the exchange between the groups of `factors`, one of `surfaces` each.
+    /// Solves for the exchange between the rows of `factors`, one of `surfaces` each. The two sides
+    /// of a group have one boundary condition.
     ///
     /// `progress` is called with the residual after every product with the matrix, and may cancel:
     /// then there is no balance. Reflectance may be 1. The result has the same bits on every run.
@@ -43,7 +48,8 @@ impl HeatBalance {
     /// [`ErrorKind::Setting`], with the name of the group, for a temperature that is negative or
     /// not finite, an emissivity outside [0, 1] or not one per band, a net flux out of a group that
     /// absorbs nothing, a net flux that would require a temperature below 0 K, groups with an
-    /// undetermined temperature, and band edges that do not ascend.
+    /// undetermined temperature, different boundary conditions of the sides of a group, and band
+    /// edges that do not ascend.
     pub fn of(
         factors: &ViewFactors,
         surfaces: &[Surface],
@@ -52,7 +58,8 @@ impl HeatBalance {
     ) -> Result<Option<HeatBalance>, Error> {
         check(factors, surfaces, settings)?;
         undetermined::check(factors, surfaces, settings.band_edges.len() + 1)?;
-        Exchange::new(factors, surfaces, settings).solve(progress)
+        let solved = Exchange::new(factors, surfaces, settings).solve(progress)?;
+        solved.as_ref().map(HeatBalance::new).transpose()
     }
 }
 
@@ -80,5 +87,20 @@ fn check(
         return wrong("surfaces", surfaces.len().to_string(), remedy);
     }
     let mut groups = factors.names.iter().zip(surfaces);
-    groups.try_for_each(|(name, surface)| surface.check(name, edges.len() + 1))
+    groups.try_for_each(|(name, surface)| surface.check(name, edges.len() + 1))?;
+    if factors.back_of.len() != surfaces.len() || !are_sides(&factors.back_of) {
+        let remedy = "each is none, for a front, or a front that has no other back";
+        return wrong("back_of", "numbers of no fronts".into(), remedy.into());
+    }
+    for (row, front) in factors.back_of.iter().enumerate() {
+        let front = front.map_or(row, |front| front as usize);
+        let [here, there] = [row, front].map(|row| surfaces[row].boundary);
+        if here != there {
+            let found = format!("{here:?} of one side, {there:?} of the other");
+            let remedy = "a sheet has one temperature, or one net flux out of both sides";
+            return Err(of_group(&factors.names[front], found, remedy));
+        }
+    }
+    let bodies = bodies::bodies(factors, surfaces);
+    bodies.iter().try_for_each(|body| body.check(&factors.names))
 }

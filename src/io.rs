@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
-//! | IESNA LM-63, EULUMDAT | [`read_photometry`] | the light distribution of a luminaire |
+//! | IESNA LM-63, EULUMDAT | [`PhotometrySettings`] | the light distribution of a luminaire |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -56,10 +56,11 @@ pub use self::glb::write_light_map_glb;
 pub use self::glb::{GlbSettings, write_glb};
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
+pub use files::read_text;
 #[cfg(feature = "npz")]
 pub use npz::{npz_from_bytes, read_npz, write_npz};
 pub use obj::{ObjSettings, load_obj, read_obj};
-pub use photometry::{Photometry, photometry_from_bytes, read_photometry};
+pub use photometry::{Photometry, PhotometrySettings, photometry_from_bytes, read_photometry};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_bands::write_ply_bands;
 pub use ply_reader::read_ply;

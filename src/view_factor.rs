@@ -1,7 +1,8 @@
 //! View factors between whole groups of surfaces, as used in heat transfer.
 //!
 //! F_ij is the fraction of the flux leaving group i that arrives at fronts of group j, averaged
-//! over the area of i. There are two methods; [`ViewFactors::new`] selects one by the predicted
+//! over the area of i. Of a two-sided group the front and the back are a row each
+//! ([`MatrixRows`]). There are two methods; [`ViewFactors::new`] selects one by the predicted
 //! time of the first:
 //!
 //! ```text
@@ -24,6 +25,7 @@
 //! [`ViewFactors::enforced`] makes a matrix that satisfies them. Files: [`crate::io`].
 
 mod assembler;
+mod backs_met;
 mod blocker_tree;
 mod checks;
 mod convex_polygons;
@@ -33,6 +35,7 @@ mod enforcement;
 mod fronts;
 mod known_blockers;
 mod matrix;
+mod matrix_rows;
 mod pair_estimate;
 mod pair_visibility;
 mod partial_matrix;
@@ -57,9 +60,12 @@ use crate::error::{Error, ErrorKind};
 use crate::ranks::{Alone, Ranks};
 use crate::scene::Scene;
 
+pub use self::backs_met::{BackMet, backs_met};
 pub use self::checks::{ErrorStats, MatrixChecks};
 pub use self::enforcement::EnforcementReport;
 pub use self::matrix::{Estimate, Factor, MatrixSize, Missing, ViewFactors};
+pub use self::matrix_rows::MatrixRows;
+pub(crate) use self::matrix_rows::are_sides;
 pub use self::partial_matrix::PartialMatrix;
 
 impl ViewFactors {
@@ -96,14 +102,15 @@ impl ViewFactors {
         if effort::method(&polygons) == Method::Sparse {
             return Ok(sparse::predicted_size(scene, polygons, error));
         }
-        let factors = scene.groups().len().pow(2);
+        let factors = polygons.fronts.rows.count().pow(2);
         // Measured: 28 to 34 bytes for cubes with a box inside.
         Ok(MatrixSize { factors, bytes: 35 * factors })
     }
 
     /// The matrix of `scene` with an absolute standard error well below `error` on every factor.
     ///
-    /// Groups with an index in `two_sided` emit and receive on both sides. `progress` is called
+    /// Groups with an index in `two_sided` emit and receive on both sides, and have a row for each:
+    /// the backs come after all groups, in their order. `progress` is called
     /// with the number of convex polygons done and their total, and may cancel: then there is no
     /// matrix. The result has the same bits on every run.
     ///
@@ -154,7 +161,7 @@ impl ViewFactors {
         whole(scene, error, two_sided, Some(Method::Sparse), progress)
     }
 
-    /// Rows of the exact matrix for the groups `from`: a reference for another matrix.
+    /// The rows `from` of the exact matrix: a reference for another matrix.
     ///
     /// Settings, errors and `progress` (called with rows) are those of [`ViewFactors::exact`].
     ///
@@ -168,8 +175,13 @@ impl ViewFactors {
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<Vec<Vec<Factor>>>, Error> {
         check_settings(scene, error, two_sided)?;
-        check_settings(scene, error, from)?;
-        let assembler = Assembler::new(ScenePolygons::new(scene, two_sided), error);
+        let polygons = ScenePolygons::new(scene, two_sided);
+        let count = polygons.fronts.rows.count();
+        if let Some(row) = from.iter().find(|row| **row >= count) {
+            let remedy = format!("the matrix has {count} rows");
+            return Err(Error::new(ErrorKind::Setting, "row", row.to_string(), remedy));
+        }
+        let assembler = Assembler::new(polygons, error);
         let mut rows = Vec::with_capacity(from.len());
         for &group in from {
             rows.push(assembler.whole_row(group));
@@ -182,7 +194,7 @@ impl ViewFactors {
 }
 
 impl PartialMatrix {
-    /// Computes those rows of `groups` that are not in `done`, of the matrix that
+    /// Computes those rows `wanted` that are not in `done`, of the matrix that
     /// [`ViewFactors::new`] makes with these settings, and returns them with those of `done`.
     ///
     /// `ranks` share the work; [`Alone`](crate::ranks::Alone) is a single process. `progress` is
@@ -190,36 +202,32 @@ impl PartialMatrix {
     /// work: the rows done so far are returned.
     ///
     /// # Errors
-    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group does not exist, or `done`
-    /// belongs to another scene or other settings.
+    /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group or a row does not exist, or
+    /// `done` belongs to another scene or other settings.
     pub fn make(
         scene: &Scene,
         error: f64,
         two_sided: &[usize],
-        groups: Range<usize>,
+        wanted: Range<usize>,
         done: Option<PartialMatrix>,
         ranks: &mut dyn Ranks,
         mut progress: impl FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
     ) -> Result<PartialMatrix, Error> {
-        let count = scene.groups().len();
-        if groups.start > groups.end || groups.end > count {
-            let found = format!("{}..{}", groups.start, groups.end);
-            return Err(Error::new(
-                ErrorKind::Setting,
-                "rows",
-                found,
-                format!("the scene has {count} groups, from 0"),
-            ));
-        }
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
+        let count = polygons.fronts.rows.count();
+        if wanted.start > wanted.end || wanted.end > count {
+            let found = format!("{}..{}", wanted.start, wanted.end);
+            let remedy = format!("the matrix has {count} rows, from 0");
+            return Err(Error::new(ErrorKind::Setting, "rows", found, remedy));
+        }
         let method = effort::method(&polygons);
         let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
         if let Some(done) = done {
             part.check_fits(&done, "rows that are done")?;
             part = done;
         }
-        Ok(with_rows(part, scene, polygons, error, groups, ranks, &mut progress).0)
+        Ok(with_rows(part, scene, polygons, error, wanted, ranks, &mut progress).0)
     }
 }
 
@@ -234,25 +242,25 @@ fn whole(
     check_settings(scene, error, two_sided)?;
     let polygons = ScenePolygons::new(scene, two_sided);
     let method = method.unwrap_or_else(|| effort::method(&polygons));
-    let part = PartialMatrix::none(scene, error, &[], method, &polygons);
-    let groups = 0..scene.groups().len();
+    let part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
+    let all = 0..polygons.fronts.rows.count();
     let mut told = |_: &PartialMatrix, done, of| progress(done, of);
     let alone = &mut Alone;
-    let (part, is_done) = with_rows(part, scene, polygons, error, groups, alone, &mut told);
+    let (part, is_done) = with_rows(part, scene, polygons, error, all, alone, &mut told);
     Ok(if is_done { part.into_matrix().ok() } else { None })
 }
 
-/// `part` with rows of `groups` added, and whether the work was completed.
+/// `part` with the rows `wanted` added, and whether the work was completed.
 fn with_rows(
     part: PartialMatrix,
     scene: &Scene,
     polygons: ScenePolygons,
     error: f64,
-    groups: Range<usize>,
+    wanted: Range<usize>,
     ranks: &mut dyn Ranks,
     progress: &mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
 ) -> (PartialMatrix, bool) {
-    let wanted = part.polygons_without_rows(groups);
+    let wanted = part.polygons_without_rows(wanted);
     let mut making = Making { part, ranks, progress };
     let done = match making.part.method() {
         Method::Exact => assembler::make(polygons, error, &wanted, &mut making),
@@ -263,16 +271,21 @@ fn with_rows(
 
 /// Whether `error` and `two_sided` are valid settings of [`ViewFactors::new`].
 fn check_settings(scene: &Scene, error: f64, two_sided: &[usize]) -> Result<(), Error> {
-    let groups = scene.groups().len();
-    let wrong = |place: &str, found: String, remedy: String| {
-        Err(Error::new(ErrorKind::Setting, place, found, remedy))
-    };
     if !(error > 0.0 && error < 1.0) {
-        return wrong("error", error.to_string(), "it must be in (0, 1)".into());
+        let remedy = "it must be in (0, 1)";
+        return Err(Error::new(ErrorKind::Setting, "error", error.to_string(), remedy));
     }
-    if let Some(group) = two_sided.iter().find(|g| **g >= groups) {
-        let remedy = format!("the scene has {groups} groups");
-        return wrong("two-sided group", group.to_string(), remedy);
+    check_two_sided(scene, two_sided)
+}
+
+/// Whether these groups are in `scene`.
+fn check_two_sided(scene: &Scene, two_sided: &[usize]) -> Result<(), Error> {
+    let groups = scene.groups().len();
+    match two_sided.iter().find(|group| **group >= groups) {
+        None => Ok(()),
+        Some(group) => {
+            let remedy = format!("the scene has {groups} groups");
+            Err(Error::new(ErrorKind::Setting, "two-sided group", group.to_string(), remedy))
+        }
     }
-    Ok(())
 }

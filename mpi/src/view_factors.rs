@@ -9,7 +9,7 @@ use radiosity::ObjSettings;
 use radiosity::io::view_factors::{read_rows, write_rows};
 use radiosity::io::{SpecularSurfaces, write_npz};
 use radiosity::ranks::Ranks;
-use radiosity::view_factor::PartialMatrix;
+use radiosity::view_factor::{MatrixRows, PartialMatrix};
 
 use crate::Failure;
 use crate::world::World;
@@ -71,7 +71,7 @@ pub fn run(parser: &mut lexopt::Parser, world: &mut World) -> Result<(), Failure
         }
         if failure.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let all = 0..scene.groups().len();
+    let all = 0..MatrixRows::new(scene.groups(), &groups).names.len();
     let rows = PartialMatrix::make(&scene, error, &groups, all, done, world, progress)?;
     if let Some(failure) = failure {
         return Err(failure.into());

@@ -8,11 +8,12 @@ use crate::error::{Error, ErrorKind, quoted};
 pub enum Boundary {
     /// Its temperature, K.
     Temperature(f64),
-    /// The net flux out of it, W/m²: heat supplied from within or behind; 0 if it is adiabatic.
+    /// The net flux out of it, W/m²: heat supplied from within or behind; 0 if it is adiabatic. Of
+    /// a two-sided group the mean over both sides.
     NetFlux(f64),
 }
 
-/// Thermal properties of a group.
+/// Thermal properties of a group, or of one side of a two-sided one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Its temperature or its net flux.
@@ -42,7 +43,6 @@ impl Surface {
         if let Some(e) = self.emissivity.iter().find(|e| !(0.0..=1.0).contains(*e)) {
             return Err(of_group(name, format!("emissivity {e}"), "it must be in [0, 1]"));
         }
-        let reflects_all = self.emissivity.iter().all(|&e| e == 0.0);
         match self.boundary {
             Boundary::Temperature(t) if !is_temperature(t) => {
                 let remedy = "it must be at least 0 K, and finite";
@@ -50,11 +50,6 @@ impl Surface {
             }
             Boundary::NetFlux(q) if !q.is_finite() => {
                 Err(of_group(name, format!("net flux {q}"), "it must be finite"))
-            }
-            Boundary::NetFlux(q) if q != 0.0 && reflects_all => {
-                let found = format!("net flux {q} with emissivity 0");
-                let remedy = "what neither emits nor absorbs has none: give it an emissivity";
-                Err(of_group(name, found, remedy))
             }
             _ => Ok(()),
         }

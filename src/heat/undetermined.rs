@@ -1,5 +1,6 @@
 //! Detects groups with an undetermined temperature.
 
+use super::bodies::{Body, bodies};
 use super::surface::{Boundary, Surface, of_group};
 use crate::error::Error;
 use crate::geometry::union_find::UnionFind;
@@ -22,12 +23,18 @@ pub(super) fn check(
             (0..bands).for_each(|band| sets.join(node(i, band), node(factor.to as usize, band)));
         }
     }
-    let absorbing = |i: usize| (0..bands).filter(move |&band| surfaces[i].emissivity[band] > 0.0);
-    let has_flux = |i: usize| matches!(surfaces[i].boundary, Boundary::NetFlux(_));
-    for i in (0..surfaces.len()).filter(|&i| has_flux(i)) {
-        if let Some(first) = absorbing(i).next() {
-            absorbing(i).for_each(|band| sets.join(node(i, first), node(i, band)));
-        }
+    let bodies = bodies(factors, surfaces);
+    // The nodes at which a body absorbs.
+    let absorbing = |body: &Body| {
+        let rows = body.sides.iter().map(|side| side.row);
+        let nodes = rows.flat_map(|row| (0..bands).map(move |band| (row, band)));
+        let absorbs = |&(row, band): &(usize, usize)| surfaces[row].emissivity[band] > 0.0;
+        nodes.filter(absorbs).map(|(row, band)| node(row, band)).collect::<Vec<usize>>()
+    };
+    let has_flux = |body: &&Body| matches!(body.boundary, Boundary::NetFlux(_));
+    for body in bodies.iter().filter(has_flux) {
+        let nodes = absorbing(body);
+        nodes.iter().for_each(|&node| sets.join(nodes[0], node));
     }
     let mut is_anchored = vec![false; surfaces.len() * bands];
     // Shares below 1e-12 are rounding.
@@ -36,16 +43,16 @@ pub(super) fn check(
     for i in factors.open_rows().into_iter().chain(lost_to_backs) {
         (0..bands).for_each(|band| is_anchored[sets.find(node(i, band))] = true);
     }
-    for i in (0..surfaces.len()).filter(|&i| !has_flux(i)) {
-        absorbing(i).for_each(|band| is_anchored[sets.find(node(i, band))] = true);
+    for body in bodies.iter().filter(|body| !has_flux(body)) {
+        absorbing(body).iter().for_each(|&node| is_anchored[sets.find(node)] = true);
     }
-    for i in (0..surfaces.len()).filter(|&i| has_flux(i)) {
-        if let Some(first) = absorbing(i).next()
-            && !is_anchored[sets.find(node(i, first))]
+    for body in bodies.iter().filter(has_flux) {
+        if let Some(&first) = absorbing(body).first()
+            && !is_anchored[sets.find(first)]
         {
             let found = "a net flux, and nothing in sight that has a temperature and absorbs";
             let remedy = "give one group of its enclosure a temperature and an emissivity above 0";
-            return Err(of_group(&factors.names[i], found, remedy));
+            return Err(of_group(&factors.names[body.sides[0].row], found, remedy));
         }
     }
     Ok(())

@@ -12,7 +12,8 @@ use std::path::{Component, Path, PathBuf};
 
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::error::quoted;
+use super::cannot_read;
+use crate::error::{Error, quoted};
 
 /// Maximum number of bytes of an OBJ file, and of all its libraries together: a corner takes at
 /// least two, so that 32 bits number the sides of all triangles.
@@ -216,6 +217,21 @@ pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<Vec<u8>> {
 
 fn too_large(most: u64) -> io::Error {
     io::Error::new(ErrorKind::FileTooLarge, format!("it has more than {most} bytes"))
+}
+
+/// The text of a file of at most `most` bytes, in UTF-8, UTF-16 or Windows-1252, without a
+/// byte-order mark.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when it cannot be read, or is larger.
+pub fn read_text(path: impl AsRef<Path>, most: u64) -> Result<String, Error> {
+    let path = path.as_ref();
+    let bytes = read_bytes(path, most).map_err(|e| cannot_read(path, e, "give a text file"))?;
+    let (mut text, _) = decode(bytes);
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
 }
 
 /// `bytes` as text, and the name of their encoding where that is not UTF-8: UTF-16 by its

@@ -6,6 +6,7 @@
 //! | `standard_error` | as `data` | of each factor |
 //! | `area`, `open`, `open_error`, `back`, `back_error` | one per group | |
 //! | `names` | bytes | of all groups, UTF-8, a line feed between |
+//! | `back_of` | one per group | the group whose back it is, from 0; −1 for fronts |
 //! | `absent` | 1 | meaning of a missing pair: 0 for zero, 2 for unmet ([`Missing`]) |
 
 use std::fs::File;
@@ -18,11 +19,11 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::{cannot_read, write_file};
 use crate::error::{Error, ErrorKind};
-use crate::view_factor::{Estimate, Factor, Missing, ViewFactors};
+use crate::view_factor::{Estimate, Factor, MatrixRows, Missing, ViewFactors, are_sides};
 
 /// Writes the nonzeros as the compressed sparse rows that `scipy.sparse.load_npz` reads, and
 /// additional arrays, which it ignores: `standard_error` of each; of each group `area`, `open` and
-/// `back` with their errors; `names`, separated by line feeds; `absent`.
+/// `back` with their errors; `names`, separated by line feeds; `back_of`; `absent`.
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be written.
@@ -56,6 +57,8 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
             archive.add(&format!("{name}_error"), n as u64, errors)?;
         }
         archive.add("names", names.len() as u64, names.bytes())?;
+        let back_of = matrix.back_of.iter().map(|front| front.map_or(-1, |front| front as i32));
+        archive.add("back_of", n as u64, back_of)?;
         archive.add("absent", 1, std::iter::once(absent))?;
         archive.0.finish()?;
         Ok(())
@@ -99,7 +102,7 @@ impl Archive<'_> {
 }
 
 /// Reads a matrix written by [`write_npz`], or by a program with the same arrays; without `names`,
-/// groups are named by their numbers, from 1.
+/// groups are named by their numbers, from 1; without `back_of`, all are fronts.
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be read, or an array is missing, compressed, of a wrong
@@ -139,7 +142,7 @@ fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
     let errors = arrays.sizes("standard_error", count)?;
     let areas = arrays.sizes("area", groups)?;
     let (open, back) = (arrays.shares("open", groups)?, arrays.shares("back", groups)?);
-    let (names, absent) = (arrays.names(groups)?, arrays.absent()?);
+    let (MatrixRows { names, back_of }, absent) = (arrays.rows(groups)?, arrays.absent()?);
     check_range("data", &values, is_size, "at least 0")?;
     let mut factors = Vec::with_capacity(groups);
     for row in row_starts.windows(2) {
@@ -156,7 +159,7 @@ fn read(bytes: impl Read + Seek) -> Result<ViewFactors, Error> {
             row.map(|(&to, (&value, &error))| Factor { to: to as u32, value, error }).collect(),
         );
     }
-    Ok(ViewFactors { names, areas, factors, open, back, absent })
+    Ok(ViewFactors { names, back_of, areas, factors, open, back, absent })
 }
 
 fn is_size(value: f64) -> bool {
@@ -198,6 +201,23 @@ impl<R: Read + Seek> Arrays<'_, R> {
             return Err(wrong("names", format!("{} lines", names.len()), remedy));
         }
         Ok(names)
+    }
+
+    /// Names and sides of `groups`.
+    fn rows(&mut self, groups: usize) -> Result<MatrixRows, Error> {
+        let numbers = match self.has("back_of") {
+            true => self.integers("back_of", Some(groups))?,
+            false => vec![-1; groups],
+        };
+        let front = |&front: &i64| (front != -1).then_some(front as u32);
+        let back_of = numbers.iter().map(front).collect();
+        let rows = MatrixRows { names: self.names(groups)?, back_of };
+        let in_range = numbers.iter().all(|front| (-1..groups as i64).contains(front));
+        if !in_range || !are_sides(&rows.back_of) {
+            let remedy = "-1, or another group, which is a front and has no other back";
+            return Err(wrong("back_of", "numbers of no fronts", remedy));
+        }
+        Ok(rows)
     }
 
     fn absent(&mut self) -> Result<Missing, Error> {

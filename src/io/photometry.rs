@@ -9,6 +9,7 @@
 //! ([`Photometry::warnings`]); others are refused with their line.
 
 mod eulumdat;
+mod lamp_set;
 mod lm_63;
 mod numbers;
 mod planes;
@@ -49,36 +50,64 @@ impl Photometry {
     }
 }
 
-/// Reads an IESNA LM-63 file of 1986 to 2019, of any photometric type, or a EULUMDAT file; the
-/// format is detected from the content.
-///
-/// Intensities become candela: of LM-63 times the multiplier and the ballast's factors; of
-/// EULUMDAT, which has them per 1000 lm, times the flux of the first set of lamps. Their light is
-/// in lumens and lux: then all numbers of the scene should be photometric, `Ke` in cd/m².
+/// Which luminaire is read, of files with several.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PhotometrySettings {
+    /// Number of the set of lamps, from 1, of EULUMDAT files with several: they are alternatives.
+    /// Without it, sets of unequal flux are an error.
+    pub lamp_set: Option<usize>,
+}
+
+impl PhotometrySettings {
+    /// Reads an IESNA LM-63 file of 1986 to 2019, of any photometric type, or a EULUMDAT file; the
+    /// format is detected from the content.
+    ///
+    /// Intensities become candela: of LM-63 times the multiplier and the ballast's factors; of
+    /// EULUMDAT, which has them per 1000 lm, times the flux of a set of lamps. Their light is in
+    /// lumens and lux: then all numbers of the scene should be photometric, `Ke` in cd/m².
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::File`] when the file cannot be read or has more than 4 MiB;
+    /// [`crate::ErrorKind::Scene`] with its line if it is of neither format, ends early, has
+    /// invalid numbers, or has several sets of lamps, none of which is chosen.
+    pub fn read(&self, path: impl AsRef<Path>) -> Result<Photometry, Error> {
+        let path = path.as_ref();
+        // Five times the bytes of a file with 361 × 181 values.
+        let bytes = files::read_bytes(path, 1 << 22).map_err(|e| {
+            cannot_read(path, e, "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file")
+        })?;
+        self.read_bytes(path, bytes)
+    }
+
+    /// The same from memory; `name` is for messages.
+    ///
+    /// # Errors
+    /// Those of [`PhotometrySettings::read`].
+    pub fn read_bytes(&self, name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Photometry, Error> {
+        let name = name.as_ref();
+        let (text, _) = files::decode(bytes);
+        match lm_63::is_lm_63(&text) {
+            true => lm_63::read(name, &text),
+            false => eulumdat::read(name, &text, self.lamp_set),
+        }
+    }
+}
+
+/// [`PhotometrySettings::read`] of a file with one luminaire.
 ///
 /// # Errors
-/// [`crate::ErrorKind::File`] when the file cannot be read or has more than 4 MiB;
-/// [`crate::ErrorKind::Scene`] with its line if it is of neither format, ends early, or has invalid
-/// numbers.
+/// Those of [`PhotometrySettings::read`].
 pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
-    let path = path.as_ref();
-    // Five times the bytes of a file with 361 × 181 values.
-    let bytes = files::read_bytes(path, 1 << 22)
-        .map_err(|e| cannot_read(path, e, "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file"))?;
-    photometry_from_bytes(path, bytes)
+    PhotometrySettings::default().read(path)
 }
 
 /// [`read_photometry`] from memory; `name` is for messages.
 ///
 /// # Errors
-/// Those of [`read_photometry`].
+/// Those of [`PhotometrySettings::read`].
 pub fn photometry_from_bytes(name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Photometry, Error> {
-    let name = name.as_ref();
-    let (text, _) = files::decode(bytes);
-    match lm_63::is_lm_63(&text) {
-        true => lm_63::read(name, &text),
-        false => eulumdat::read(name, &text),
-    }
+    PhotometrySettings::default().read_bytes(name, bytes)
 }
 
 /// `text` as a name.

@@ -8,7 +8,8 @@
 //! | [`write_rows`], [`read_rows`] | some of the rows, for resuming only | left out | yes |
 //!
 //! In all of them the emitting group comes first: rows emit, columns receive. Areas are in the
-//! scene's length unit squared, factors are dimensionless.
+//! scene's length unit squared, factors are dimensionless. `open`, `back` and `area` are in
+//! parentheses where a group is called so ([`ViewFactors::column_name`]).
 
 use std::io::Write;
 use std::path::Path;
@@ -27,7 +28,8 @@ use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
-        writeln!(out, "F from row to column,{},open,back,area", names.join(","))?;
+        let own = ["open", "back", "area"].map(|name| matrix.column_name(name)).join(",");
+        writeln!(out, "F from row to column,{},{own}", names.join(","))?;
         for (i, name) in names.iter().enumerate() {
             write!(out, "{name}")?;
             let mut row = matrix.factors[i].iter().peekable();
@@ -55,6 +57,7 @@ pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<
 pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
     write_file(path.as_ref(), |out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
+        let [open, back] = ["open", "back"].map(|name| matrix.column_name(name));
         writeln!(out, "from,to,factor,standard_error,from_area,to_area")?;
         for (i, name) in names.iter().enumerate() {
             let area = matrix.areas[i];
@@ -63,7 +66,7 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
                 let factor = with_error(Estimate { value: f.value, error: f.error });
                 writeln!(out, "{name},{to},{factor},{area},{other}")?;
             }
-            for (to, share) in [("open", matrix.open[i]), ("back", matrix.back[i])] {
+            for (to, share) in [(&open, matrix.open[i]), (&back, matrix.back[i])] {
                 writeln!(out, "{name},{to},{},{area},", with_error(share))?;
             }
         }

@@ -10,7 +10,7 @@
 //! The open share of a row indicates faults of the scene: if above its error, the enclosure has a
 //! gap; if below minus its error, surfaces coincide.
 
-use super::matrix::ViewFactors;
+use super::matrix::{Estimate, ViewFactors};
 use crate::geometry::COINCIDENCE_TOLERANCE;
 
 /// Deviations of a matrix from the laws. A correct row sum does not prove correct entries: that of
@@ -80,11 +80,35 @@ impl ViewFactors {
         rows
     }
 
+    /// The groups of whose flux some arrives at backs, where it is lost: more than three standard
+    /// errors. The largest share comes first.
+    pub fn rows_that_meet_backs(&self) -> Vec<usize> {
+        let share = |i: usize| self.back[i].value;
+        let meets = |i: &usize| share(*i) > tolerance(self.back[*i]);
+        let mut rows: Vec<usize> = (0..self.back.len()).filter(meets).collect();
+        rows.sort_by(|&i, &j| share(j).total_cmp(&share(i)).then(i.cmp(&j)));
+        rows
+    }
+
+    /// Row and column of the factor that is furthest out of its bounds, of those that are by more
+    /// than three standard errors and rounding.
+    pub fn worst_out_of_bounds(&self) -> Option<(usize, usize)> {
+        // A factor and its bound are quotients of sums, which round by ε of a term each. Of pairs
+        // of polygons within a group the error allows for as much: 1e-13 of the smaller one each.
+        let terms = self.areas.len() as f64;
+        let beyond = |&((i, j), excess): &((usize, usize), f64)| {
+            let rounding = terms * f64::EPSILON * largest_factor(self, i, j);
+            excess > 3.0 * self.factor(i, j).error + rounding
+        };
+        let worst = bound_errors(self).filter(beyond).max_by(|a, b| a.1.total_cmp(&b.1));
+        worst.map(|(at, _)| at)
+    }
+
     /// The groups whose rows sum to more than one by over three standard errors: they see
     /// coinciding surfaces, such as a poster in the plane of its wall. The largest sum comes first.
     pub fn rows_over_unity(&self) -> Vec<usize> {
         let excess = |i: usize| -self.open[i].value;
-        let is_over = |i: &usize| excess(*i) > open_tolerance(self, *i);
+        let is_over = |i: &usize| excess(*i) > tolerance(self.open[*i]);
         let mut rows: Vec<usize> = (0..self.open.len()).filter(is_over).collect();
         rows.sort_by(|&i, &j| excess(j).total_cmp(&excess(i)).then(i.cmp(&j)));
         rows
@@ -119,19 +143,21 @@ fn reciprocity_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), 
 }
 
 fn bound_errors(m: &ViewFactors) -> impl Iterator<Item = ((usize, usize), f64)> {
-    entries(m).map(|(i, j, value)| {
-        let largest = (m.areas[j] / m.areas[i]).min(1.0);
-        ((i, j), (value - largest).max(-value).max(0.0))
-    })
+    entries(m).map(|(i, j, value)| ((i, j), (value - largest_factor(m, i, j)).max(-value).max(0.0)))
 }
 
-/// Maximum deviation of an open share from zero that still counts as closed.
-fn open_tolerance(m: &ViewFactors, i: usize) -> f64 {
+/// The upper bound of a factor.
+fn largest_factor(m: &ViewFactors, i: usize, j: usize) -> f64 {
+    (m.areas[j] / m.areas[i]).min(1.0)
+}
+
+/// Maximum deviation of a share of a row from zero that still counts as zero.
+fn tolerance(share: Estimate) -> f64 {
     // Three standard errors, and the rounding of a row of thousands of factors.
-    3.0 * m.open[i].error + COINCIDENCE_TOLERANCE
+    3.0 * share.error + COINCIDENCE_TOLERANCE
 }
 
 /// Whether the open share of group `i` is zero within its error, or below.
 pub(super) fn is_closed(m: &ViewFactors, i: usize) -> bool {
-    m.open[i].value <= open_tolerance(m, i)
+    m.open[i].value <= tolerance(m.open[i])
 }

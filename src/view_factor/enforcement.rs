@@ -68,6 +68,7 @@ impl ViewFactors {
         let max_change = rows.iter().map(|row| row.max_change).fold(0.0, f64::max);
         let mut enforced = ViewFactors {
             names: matrix.names.clone(),
+            back_of: matrix.back_of.clone(),
             areas: matrix.areas.clone(),
             factors: rows.into_iter().map(|row| row.factors).collect(),
             open: matrix.open.clone(),

@@ -1,15 +1,25 @@
 //! The polygons that emit and receive: those of all groups, and the backs of two-sided ones.
 
 use super::convex_polygons::{ConvexPolygon, Merge, MergedTriangles, convex_polygons};
+use super::matrix_rows::MatrixRows;
 use crate::scene::Scene;
 
-/// Polygons that emit and receive, by group, and the polygon of each triangle.
+/// Polygons that emit and receive, by row of the matrix, and the polygon of each triangle.
 pub(super) struct Fronts {
+    /// Their groups are rows of the matrix: those of the scene, then the backs of two-sided ones.
     pub polygons: Vec<ConvexPolygon>,
-    /// Radiating area of each group, in squares of the scene's unit.
+    pub rows: MatrixRows,
+    /// Area of each row, in squares of the scene's unit.
     pub areas: Vec<f64>,
     /// Per triangle, the index of the polygon that a ray hits on its front, and on its back.
     of_triangle: Vec<[Option<u32>; 2]>,
+}
+
+/// A side of a polygon, and the row of the matrix that it belongs to.
+struct Side {
+    polygon: usize,
+    is_back: bool,
+    row: u32,
 }
 
 impl Fronts {
@@ -18,26 +28,28 @@ impl Fronts {
     pub fn new(scene: &Scene, unit: f64, two_sided: &[usize]) -> Fronts {
         let MergedTriangles { polygons, of_triangle } =
             convex_polygons(scene, unit, Merge::WithinGroups);
-        let mut is_two_sided = vec![false; scene.groups().len()];
-        two_sided.iter().for_each(|&group| is_two_sided[group] = true);
-        // Polygon and side of each front; the backs come after the fronts.
-        let count = polygons.len();
-        let backs = (0..count).filter(|&k| is_two_sided[polygons[k].group as usize]);
-        let mut sides: Vec<(usize, usize)> = (0..count).map(|k| (k, 0)).collect();
-        sides.extend(backs.map(|k| (k, 1)));
-        sides.sort_by_key(|&(k, _)| polygons[k].group);
-        let mut numbers = vec![[None; 2]; count];
-        let mut areas = vec![0.0; scene.groups().len()];
+        let rows = MatrixRows::new(scene.groups(), two_sided);
+        let backs = rows.backs();
+        let mut sides: Vec<Side> = vec![];
+        for (k, polygon) in polygons.iter().enumerate() {
+            let row = polygon.group;
+            sides.push(Side { polygon: k, is_back: false, row });
+            let back = backs[row as usize];
+            sides.extend(back.map(|row| Side { polygon: k, is_back: true, row }));
+        }
+        sides.sort_by_key(|side| side.row);
+        let mut numbers = vec![[None; 2]; polygons.len()];
+        let mut areas = vec![0.0; rows.count()];
         let mut fronts = Vec::with_capacity(sides.len());
-        for (number, (k, side)) in (0..).zip(sides) {
-            let polygon = &polygons[k];
-            numbers[k][side] = Some(number);
-            areas[polygon.group as usize] += polygon.area;
-            fronts.push(if side == 0 { polygon.clone() } else { polygon.reversed() });
+        for (number, Side { polygon: k, is_back, row }) in (0..).zip(sides) {
+            let polygon = if is_back { polygons[k].reversed() } else { polygons[k].clone() };
+            numbers[k][usize::from(is_back)] = Some(number);
+            areas[row as usize] += polygon.area;
+            fronts.push(ConvexPolygon { group: row, ..polygon });
         }
         let numbers_of = |k: Option<u32>| k.map_or([None; 2], |k| numbers[k as usize]);
         let of_triangle = of_triangle.into_iter().map(numbers_of).collect();
-        Fronts { polygons: fronts, areas, of_triangle }
+        Fronts { polygons: fronts, rows, areas, of_triangle }
     }
 
     /// The index of the polygon hit by a ray on the front of triangle `t`, or on its back.
@@ -50,7 +62,7 @@ impl Fronts {
         self.of_triangle[t]
     }
 
-    /// The group of polygon `s`.
+    /// The row of polygon `s`.
     pub fn group(&self, s: u32) -> usize {
         self.polygons[s as usize].group as usize
     }

@@ -2,17 +2,23 @@
 //!
 //! Rows emit, columns receive. The factors, the open share and the back share of a row sum to one.
 
+use super::matrix_rows::{MatrixRows, unused};
+
 /// The matrix of area-averaged form factors between the groups of a scene, sparse, with a standard
 /// error beside every factor.
 ///
-/// All vectors have one entry per group, in the order of
-/// [`Scene::groups`](crate::scene::Scene::groups). F_ij is the fraction of the flux leaving group i
-/// (the row) that arrives at fronts of group j (the column), 0 to 1.
+/// All vectors have one entry per row. The rows are the fronts of all groups, in the order of
+/// [`Scene::groups`](crate::scene::Scene::groups), then the backs of two-sided ones: what follows
+/// calls each of them a group. F_ij is the fraction of the flux leaving group i (the row) that
+/// arrives at group j (the column), 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewFactors {
     /// Names of the groups, in the order of rows and columns.
     pub names: Vec<String>,
-    /// Radiating area of each group, length unit squared; both sides of a two-sided group.
+    /// Per row, the row of the front that it is the back of: both are sides of one sheet. `None`
+    /// for fronts.
+    pub back_of: Vec<Option<u32>>,
+    /// Area of each row, length unit squared: of one side.
     pub areas: Vec<f64>,
     /// Per group i, the groups j that it sees, by ascending index.
     pub factors: Vec<Vec<Factor>>,
@@ -91,6 +97,17 @@ impl Estimate {
 }
 
 impl ViewFactors {
+    /// Names and sides of the rows.
+    pub fn rows(&self) -> MatrixRows {
+        MatrixRows { names: self.names.clone(), back_of: self.back_of.clone() }
+    }
+
+    /// The name of a column of a table that is no group, such as `open`: in parentheses where a
+    /// group has this name, so that no two columns are called the same.
+    pub fn column_name(&self, name: &str) -> String {
+        unused(name.into(), |name| self.names.iter().any(|group| group == name))
+    }
+
     /// The factor from group `i` to group `j`; zero where absent.
     ///
     /// # Panics

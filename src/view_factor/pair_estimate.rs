@@ -12,10 +12,12 @@
 //! rays have hit many               sets of rays, until they agree
 //! ```
 //!
-//! The choice depends on U, not on the count, so that it is not random. The result of the other
-//! methods is divided by the probability that a ray hits the pair at all, 1 − exp(−D A₁F₁₂): pairs
-//! that are hit stand for those that are missed, and sums are unbiased (D. G. Horvitz, D. J.
-//! Thompson, "A generalization of sampling without replacement from a finite universe", 1952).
+//! The choice depends on U, not on the count, so that it is not random. The other methods know a
+//! pair only if a ray has hit it. So each half of the rays makes an estimate: the result of the
+//! method if that half has hit the pair, else the count of the other half, which is unbiased for
+//! any set of pairs that does not depend on it. Their mean is the exchange, and sums are unbiased:
+//! nothing is assumed of the probability of a hit, which is larger for even sets of rays than for
+//! independent ones.
 
 use rayon::prelude::*;
 
@@ -47,12 +49,12 @@ pub(super) struct PairEstimator<'a> {
 }
 
 impl PairEstimator<'_> {
-    /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, with a standard error of
-    /// about `tolerance`, in squares of the scene's unit.
+    /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, by halves, with a
+    /// standard error of about `tolerance`, in squares of the scene's unit.
     pub fn exchange(
         &self,
         [s, t]: [u32; 2],
-        hits: u32,
+        hits: [u32; 2],
         tolerance: f64,
         visibility: &mut PointVisibility,
     ) -> Estimate {
@@ -64,11 +66,12 @@ impl PairEstimator<'_> {
         if unoccluded.value <= density * tolerance * tolerance {
             // For small counts, the root of the count itself covers the true value less than 19 of
             // 20 times.
+            let hits = hits[0] + hits[1];
             let error = f64::from(hits + 1).sqrt() / density;
             return Estimate { value: f64::from(hits) / density, error };
         }
         let refined = self.refined([s, t], pair, unoccluded, tolerance, visibility);
-        among_missed(refined, density)
+        with_missed(refined, hits, 0.5 * density)
     }
 
     /// Rays of polygon `s` over its area.
@@ -179,20 +182,25 @@ impl PairEstimator<'_> {
     }
 }
 
-/// Corrects an exchange that was estimated because one of `density` rays per unit of area hit it:
-/// it also stands for pairs that no ray hit.
-fn among_missed(exchange: Estimate, density: f64) -> Estimate {
+/// The mean of the estimates of both halves of the rays, `density` per unit of area each, of which
+/// `hits` hit the pair: `exchange` for a half with a hit, the count of the other for one without.
+fn with_missed(exchange: Estimate, hits: [u32; 2], density: f64) -> Estimate {
+    let by_half = |own: u32, other: u32| match own {
+        0 => f64::from(other) / density,
+        _ => exchange.value,
+    };
+    let value = 0.5 * (by_half(hits[0], hits[1]) + by_half(hits[1], hits[0]));
+    // With V the exchange, and μ = density · V hits a half, a half misses with exp(−μ) if rays are
+    // independent, more rarely if they are even. Then the mean is 0 if both miss, and half of V and
+    // a count if one does: a variance of V² exp(−μ) (exp(−μ) + 1/μ) / 2.
     let missed = (-density * exchange.value).exp();
-    let met = 1.0 - missed;
-    if met == 0.0 {
-        return exchange;
-    }
-    // The standard deviation of a value that occurs with probability `met`.
-    let of_chance = exchange.value / met * missed.sqrt();
-    Estimate { value: exchange.value / met, error: (exchange.error / met).hypot(of_chance) }
+    let square = exchange.value * exchange.value;
+    let of_chance = 0.5 * missed * (square * missed + exchange.value / density);
+    Estimate { value, error: exchange.error.hypot(of_chance.max(0.0).sqrt()) }
 }
 
-/// Number of rays that hit polygon `s`, by an ascending list.
+/// Number of rays of both halves that hit polygon `s`, by an ascending list.
 fn rays_that_met(counts: &[Count], s: u32) -> u32 {
-    counts.binary_search_by_key(&s, |count| count.polygon).map_or(0, |k| counts[k].rays)
+    let found = counts.binary_search_by_key(&s, |count| count.polygon);
+    found.map_or(0, |k| counts[k].halves[0] + counts[k].halves[1])
 }

@@ -9,13 +9,14 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use super::matrix::{Estimate, Factor, Missing, ViewFactors};
+use super::matrix_rows::MatrixRows;
 use super::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::ranks::Ranks;
 use crate::scene::Scene;
 
 /// Begins every file; the last byte is the version.
-const MAGIC: &[u8; 8] = b"radipar\x01";
+const MAGIC: &[u8; 8] = b"radipar\x02";
 
 /// Bytes of the checksum at the end of every file.
 const CHECKSUM_BYTES: usize = 8;
@@ -37,12 +38,12 @@ pub struct PartialMatrix {
     /// Hash of the scene and the settings.
     input: u64,
     method: Method,
-    names: Vec<String>,
+    matrix_rows: MatrixRows,
     /// Divisor of all lengths.
     unit: f64,
-    /// Radiating area of each group, in squares of `unit`.
+    /// Area of each row of the matrix, in squares of `unit`.
     areas: Vec<f64>,
-    /// Group of each polygon, ascending.
+    /// Row of the matrix of each polygon, ascending.
     groups: Vec<u32>,
     /// Row of each polygon, if it is done.
     rows: Vec<Option<PolygonRow>>,
@@ -115,7 +116,7 @@ impl PartialMatrix {
         PartialMatrix {
             input: input_hash(scene, error, two_sided),
             method,
-            names: scene.groups().to_vec(),
+            matrix_rows: fronts.rows.clone(),
             unit: polygons.unit,
             areas: fronts.areas.clone(),
             rows: vec![None; groups.len()],
@@ -123,7 +124,7 @@ impl PartialMatrix {
         }
     }
 
-    /// Indices of the groups with missing rows.
+    /// Indices of the rows of the matrix that are missing.
     pub fn missing(&self) -> Vec<usize> {
         let rows = self.rows.iter().zip(&self.groups).filter(|(row, _)| row.is_none());
         let mut missing: Vec<usize> = rows.map(|(_, &group)| group as usize).collect();
@@ -156,7 +157,7 @@ impl PartialMatrix {
         self.method
     }
 
-    /// The polygons of `groups` without a row.
+    /// The polygons of these rows of the matrix that have no row yet.
     pub(super) fn polygons_without_rows(&self, groups: Range<usize>) -> Vec<u32> {
         let is_wanted = |&s: &u32| {
             groups.contains(&(self.groups[s as usize] as usize)) && self.rows[s as usize].is_none()
@@ -168,7 +169,7 @@ impl PartialMatrix {
     pub(super) fn check_fits(&self, other: &PartialMatrix, place: &str) -> Result<(), Error> {
         let same = self.input == other.input
             && self.method == other.method
-            && self.names == other.names
+            && self.matrix_rows == other.matrix_rows
             && self.areas == other.areas
             && self.groups == other.groups;
         if same {
@@ -185,7 +186,8 @@ impl PartialMatrix {
     pub fn into_matrix(self) -> Result<ViewFactors, Error> {
         let missing = self.missing();
         if !missing.is_empty() {
-            let some: Vec<&str> = missing.iter().take(3).map(|&i| self.names[i].as_str()).collect();
+            let names = &self.matrix_rows.names;
+            let some: Vec<&str> = missing.iter().take(3).map(|&i| names[i].as_str()).collect();
             let found = format!("rows of {} groups missing: {}", missing.len(), quoted(&some));
             let remedy = "make them, and merge them with these";
             return Err(Error::new(ErrorKind::Setting, "parts of a matrix", found, remedy));
@@ -226,7 +228,8 @@ impl PartialMatrix {
             Method::Exact => Missing::Zero,
             Method::Sparse => Missing::Unmet,
         };
-        Ok(ViewFactors { names: self.names, areas, factors, open, back, absent })
+        let MatrixRows { names, back_of } = self.matrix_rows;
+        Ok(ViewFactors { names, back_of, areas, factors, open, back, absent })
     }
 
     /// Serializes the rows, for a file or another process.
@@ -267,7 +270,7 @@ impl PartialMatrix {
     /// Whether this is a valid partial matrix; one that was read from a file may not be.
     fn is_consistent(&self) -> bool {
         let is_size = |x: f64| x.is_finite() && x >= 0.0;
-        let groups = self.names.len();
+        let groups = self.matrix_rows.count();
         let is_exchange = |e: &Exchange| {
             (e.to as usize) < groups && is_size(e.value) && is_size(f64::from(e.error))
         };
@@ -276,7 +279,8 @@ impl PartialMatrix {
                 && row.fronts.is_sorted_by(|a, b| a.to < b.to)
         };
         // The group of the exchange with backs is always the first.
-        self.areas.len() == groups
+        self.matrix_rows.is_consistent()
+            && self.areas.len() == groups
             && self.areas.iter().copied().all(is_size)
             && self.unit.is_finite()
             && self.unit > 0.0

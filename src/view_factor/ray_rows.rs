@@ -1,8 +1,9 @@
 //! Rows of view factors from rays: the number of rays of a polygon that hit each other one first.
 //!
-//! Rays start from points all over a polygon, with cosine-distributed directions, both from one
+//! Rays start from points all over a polygon, with cosine-distributed directions, both from a
 //! low-discrepancy set of four dimensions. Each carries the same share of the flux, so that a
-//! factor is a count.
+//! factor is a count. There are two such sets, scrambled independently: what one half hits says
+//! nothing of the other.
 //!
 //! ```text
 //!     ╲  │  ╱      first half: blockers around the polygon
@@ -12,8 +13,6 @@
 //!
 //! A factor with only the *known* blockers is too large. The second half of the rays estimates the
 //! excess without bias, since the known blockers do not depend on it.
-
-use std::ops::Range;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -26,11 +25,18 @@ use crate::sampling::hemisphere::cosine_direction;
 use crate::scene::Scene;
 use crate::visibility::ray_scene::{Hit, RayScene};
 
-/// A polygon, and the number of rays that hit it.
+/// A polygon, and the number of rays of each half that hit it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Count {
     pub polygon: u32,
-    pub rays: u32,
+    pub halves: [u32; 2],
+}
+
+/// A half of the rays of a polygon.
+#[derive(Clone, Copy)]
+pub(super) enum Half {
+    First,
+    Second,
 }
 
 /// Hits of the first half of the rays of a polygon.
@@ -95,7 +101,7 @@ impl<'a> RayCaster<'a> {
     /// Casts the first half of `rays` rays from polygon `s`.
     pub fn first_half(&self, s: u32, rays: u32) -> FirstHalf {
         let (mut met, mut blockers) = (Met::default(), vec![]);
-        self.cast(s, 0..rays / 2, |_, _, hit| {
+        self.cast(s, Half::First, rays / 2, |_, _, hit| {
             met.add(self.fronts, hit);
             blockers.extend(self.blockers[hit.triangle]);
         });
@@ -103,7 +109,7 @@ impl<'a> RayCaster<'a> {
         blockers.dedup();
         // Of thousands of rays, some hundred blockers.
         blockers.shrink_to_fit();
-        FirstHalf { fronts: counted(met.fronts), back: met.backs, blockers }
+        FirstHalf { fronts: counted(met.fronts, Half::First), back: met.backs, blockers }
     }
 
     /// Casts the second half of `rays` rays from polygon `s` and adds the first; `known` blockers
@@ -113,7 +119,7 @@ impl<'a> RayCaster<'a> {
             self.blockers[hit.triangle].is_none_or(|blocker| known.binary_search(&blocker).is_ok())
         };
         let (mut met, mut hidden, mut unknown) = (Met::default(), vec![], 0);
-        self.cast(s, rays / 2..rays, |from, direction, hit| {
+        self.cast(s, Half::Second, rays / 2, |from, direction, hit| {
             met.add(self.fronts, hit);
             unknown += u32::from(!is_known(hit));
             let mut last = *hit;
@@ -124,16 +130,16 @@ impl<'a> RayCaster<'a> {
                 last = next;
             }
         });
-        let fronts = sum_of_counts(&first.fronts, &counted(met.fronts));
+        let fronts = sum_of_counts(&first.fronts, &counted(met.fronts, Half::Second));
         let back = first.back + met.backs;
-        RayRow { rays, fronts, back, unknown, hidden: counted(hidden) }
+        RayRow { rays, fronts, back, unknown, hidden: counted(hidden, Half::Second) }
     }
 
     /// Share of a set of rays from polygon `s` that hit polygon `t` first; each `seed` gives other
     /// rays.
     pub fn share(&self, s: u32, t: u32, rays: u32, seed: u64) -> f64 {
         let mut count = 0;
-        self.cast_set(s, 0..rays, seed, |_, _, hit| {
+        self.cast_set(s, rays, seed, |_, _, hit| {
             count += u32::from(self.fronts.met(hit.triangle, hit.front) == Some(t));
         });
         f64::from(count) / f64::from(rays)
@@ -148,22 +154,17 @@ impl<'a> RayCaster<'a> {
         self.rays.occluded(from, to - from, CONTACT_HEIGHT..1.0 - CONTACT_HEIGHT, is_other)
     }
 
-    /// Calls `meets` with start, direction and hit of each of these rays of polygon `s` that hits
+    /// Calls `meets` with start, direction and hit of each of `rays` rays of polygon `s` that hits
     /// something.
-    fn cast(&self, s: u32, rays: Range<u32>, meets: impl FnMut(DVec3, DVec3, &Hit)) {
-        self.cast_set(s, rays, u64::from(s) << 32, meets);
+    pub fn cast(&self, s: u32, half: Half, rays: u32, meets: impl FnMut(DVec3, DVec3, &Hit)) {
+        // Sets of 2¹⁶ points take the seeds after this: fewer than lie between the halves.
+        self.cast_set(s, rays, u64::from(s) << 32 | (half as u64) << 31, meets);
     }
 
-    fn cast_set(
-        &self,
-        s: u32,
-        rays: Range<u32>,
-        seed: u64,
-        mut meets: impl FnMut(DVec3, DVec3, &Hit),
-    ) {
+    fn cast_set(&self, s: u32, rays: u32, seed: u64, mut meets: impl FnMut(DVec3, DVec3, &Hit)) {
         let polygon = &self.fronts.polygons[s as usize];
         let points = PolygonPoints::new(&polygon.corners);
-        for k in rays {
+        for k in 0..rays {
             let [u, v, radius2, turn] = scrambled_point(k, seed);
             let from = points.at(u, v);
             let direction = cosine_direction(polygon.normal, [radius2, turn]);
@@ -197,12 +198,16 @@ impl Met {
     }
 }
 
-/// Polygons in any order, as counts by ascending index.
-fn counted(mut polygons: Vec<u32>) -> Vec<Count> {
+/// Polygons in any order that rays of a half have hit, as counts by ascending index.
+fn counted(mut polygons: Vec<u32>, half: Half) -> Vec<Count> {
     polygons.sort_unstable();
     let runs = polygons.chunk_by(|a, b| a == b);
-    let mut counts: Vec<Count> =
-        runs.map(|run| Count { polygon: run[0], rays: run.len() as u32 }).collect();
+    let count = |run: &[u32]| {
+        let mut halves = [0; 2];
+        halves[half as usize] = run.len() as u32;
+        Count { polygon: run[0], halves }
+    };
+    let mut counts: Vec<Count> = runs.map(count).collect();
     counts.shrink_to_fit();
     counts
 }
@@ -212,9 +217,9 @@ pub(super) fn sum_of_counts(a: &[Count], b: &[Count]) -> Vec<Count> {
     let mut union = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     while let Some(polygon) = [a.peek(), b.peek()].into_iter().flatten().map(|c| c.polygon).min() {
-        let of_a = a.next_if(|c| c.polygon == polygon).map_or(0, |c| c.rays);
-        let of_b = b.next_if(|c| c.polygon == polygon).map_or(0, |c| c.rays);
-        union.push(Count { polygon, rays: of_a + of_b });
+        let of_a = a.next_if(|c| c.polygon == polygon).map_or([0; 2], |c| c.halves);
+        let of_b = b.next_if(|c| c.polygon == polygon).map_or([0; 2], |c| c.halves);
+        union.push(Count { polygon, halves: [0, 1].map(|half| of_a[half] + of_b[half]) });
     }
     union
 }

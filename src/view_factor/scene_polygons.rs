@@ -19,7 +19,7 @@ pub(super) struct ScenePolygons {
 }
 
 impl ScenePolygons {
-    /// The polygons of `scene`. Groups of index `two_sided` have two fronts.
+    /// The polygons of `scene`. Groups of index `two_sided` have two sides, each a row.
     pub fn new(scene: &Scene, two_sided: &[usize]) -> ScenePolygons {
         let unit = scene.bounds().longest_side().log2().floor().exp2();
         let fronts = Fronts::new(scene, unit, two_sided);

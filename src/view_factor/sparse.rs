@@ -140,7 +140,7 @@ fn met_either_way(rows: &[RayRow]) -> Vec<Vec<Count>> {
     let mut met_by: Vec<Vec<Count>> = rows.iter().map(|_| vec![]).collect();
     for (t, row) in (0..).zip(rows) {
         for count in row.fronts.iter().take_while(|count| count.polygon < t) {
-            met_by[count.polygon as usize].push(Count { polygon: t, rays: count.rays });
+            met_by[count.polygon as usize].push(Count { polygon: t, halves: count.halves });
         }
     }
     let union = |(s, met_by): (u32, Vec<Count>)| {
@@ -160,11 +160,11 @@ fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) 
     };
     let mut visibility = PointVisibility::default();
     let mut exchanges = Vec::with_capacity(later.len());
-    for &Count { polygon: t, rays } in later {
+    for &Count { polygon: t, halves } in later {
         let ((share_s, area_s), (share_t, area_t)) = (area_share(s), area_share(t));
         // Errors of the pairs of two groups are independent: squares add up.
         let tolerance = 0.5 * error * area_s.min(area_t) * (share_s * share_t).sqrt();
-        let area = estimator.exchange([s, t], rays, tolerance, &mut visibility);
+        let area = estimator.exchange([s, t], halves, tolerance, &mut visibility);
         if area.value > 0.0 || area.error > 0.0 {
             exchanges.push(Exchange::new(fronts.group(t) as u32, area));
         }

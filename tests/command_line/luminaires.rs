@@ -98,6 +98,25 @@ fn wrong_luminaires_are_refused() {
 }
 
 #[test]
+fn sets_of_lamps_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = write(folder.path(), "room.obj", &room(6));
+    // Symmetric about its axis, 50 cd/klm in all directions; lamps of 1000 or of 3000 lm.
+    let head = "Firm\n1\n1\n1\n0\n3\n0\n\nBulb\n\n\n\n0\n0\n0\n0\n0\n0\n0\n0\n0\n100\n100\n1\n0\n";
+    let sets = "2\n1\ndim\n1000\nwarm\n80\n9\n1\nbright\n3000\nwarm\n80\n25\n";
+    let text = format!("{head}{sets}{}0\n0\n90\n180\n50\n50\n50\n", "0.5\n".repeat(10));
+    let lamp = write(folder.path(), "two.ldt", &text).display().to_string();
+    let at = format!("{lamp}@0.5,0.4,0.6");
+    let words = ["two.ldt:26", "1: dim, 1000 lm, 9 W; 2: bright", "--lamp-set 1 to 2"];
+    refused(&[scene.to_str().unwrap(), "--luminaire", &at], &words);
+    let (_, report, _) = baked(&scene, &["--luminaire", &at, "--lamp-set", "2"]);
+    let lumens = report["luminaires"][0]["lumens"][0].as_f64().unwrap();
+    // 150 cd all around.
+    assert!((lumens / (600.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12, "{report}");
+    assert_eq!(report["luminaires"][0]["watts"], 25.0);
+}
+
+#[test]
 fn luminaires_light_bands_as_the_file_says() {
     let folder = tempfile::tempdir().unwrap();
     let scene = write(folder.path(), "room.obj", &room(6));

@@ -3,6 +3,8 @@
 
 mod bands;
 mod emit;
+mod heat;
+mod heat_tables;
 mod light;
 mod light_map;
 mod luminaires;
@@ -40,6 +42,11 @@ fn refused(args: &[&str], words: &[&str]) {
 
 fn cornell() -> &'static str {
     concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")
+}
+
+/// A scene of `tests/data/cases`.
+fn case(name: &str) -> String {
+    format!("{}/tests/data/cases/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 fn write(folder: &Path, name: &str, text: &str) -> PathBuf {

@@ -1,6 +1,6 @@
-//! `radiosity view-factors` and `radiosity heat`.
+//! `radiosity view-factors` and `radiosity merge`.
 
-use super::{run, write};
+use super::{case, run, texts, write};
 
 #[test]
 fn view_factors_writes_a_matrix_a_file() {
@@ -32,9 +32,11 @@ fn view_factors_of_facets_are_a_row_a_face() {
     let csv = std::fs::read_to_string(folder.path().join("tent.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
     assert_eq!(rows[0][1..4], ["floor/1", "tent/1", "tent/2"]);
-    let area = |row: usize| rows[row][6].parse::<f64>().unwrap();
-    // A slope of √2 × 1 has both its sides.
-    assert!((area(1) - 2.0).abs() < 1e-12 && (area(2) - 8f64.sqrt()).abs() < 1e-12, "{csv}");
+    assert_eq!(rows[0][4..6], ["tent/1 (back)", "tent/2 (back)"]);
+    let area = |row: usize| rows[row][8].parse::<f64>().unwrap();
+    // A slope of √2 × 1, a row for each of its sides.
+    assert!((area(1) - 2.0).abs() < 1e-12, "{csv}");
+    assert!([2, 4].iter().all(|&row| (area(row) - 2f64.sqrt()).abs() < 1e-12), "{csv}");
     let out = run("view-factors", &[scene, "--facets", "--two-sided", "tarp"]);
     let error = String::from_utf8_lossy(&out.stderr);
     assert!(error.contains("'tarp'") && error.contains("floor/1, tent/1, tent/2"), "{error}");
@@ -110,68 +112,6 @@ fn square_tables_of_many_facets_are_refused() {
     }
 }
 
-/// A floor, and above it a lid as large, both of 1 m², 1 m apart.
-const TWO_SQUARES: &str = "o floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n\
-                           o lid\nv 0 0 1\nv 0 1 1\nv 1 1 1\nv 1 0 1\nf 5 6 7 8\n";
-
-#[test]
-fn heat_of_a_scene_and_of_its_view_factors() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = write(folder.path(), "squares.obj", TWO_SQUARES);
-    let boundaries = write(
-        folder.path(),
-        "known.csv",
-        "Group, temperature, flux, emissivity\nfloor/1, 500, , 1\n*, , 0, 0.3\n",
-    );
-    let [scene, boundaries] = [&scene, &boundaries].map(|path| path.to_str().unwrap());
-    let out = run("view-factors", &[scene, "--facets", "--format", "npz"]);
-    assert!(out.status.success());
-    let matrix = scene.replace(".obj", ".npz");
-    for input in [&[scene, "--facets"][..], &[&matrix]] {
-        let known = ["--boundaries", boundaries, "--surroundings", "300"];
-        let out = run("heat", &[input, &known].concat());
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-        let mut table = csv::Reader::from_path(scene.replace(".obj", ".heat.csv")).unwrap();
-        let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
-        assert_eq!([&rows[0][0], &rows[1][0]], ["floor/1", "lid/1"]);
-        let number = |row: usize, column: usize| rows[row][column].parse::<f64>().unwrap();
-        // Opposite faces of a cube see 0.19982490 of each other. What is adiabatic is as warm as
-        // what it sees: σT⁴ = F σ 500⁴ + (1 − F) σ 300⁴.
-        let (f, [hot, cold]) = (0.199_824_896, [500f64.powi(4), 300f64.powi(4)]);
-        let temperature = (f * hot + (1.0 - f) * cold).powf(0.25);
-        assert!((number(1, 2) - temperature).abs() < 1e-5, "{rows:?}");
-        let flux = 5.670374419e-8 * (1.0 - f * f) * (hot - cold);
-        assert!((number(0, 5) - flux).abs() < 1e-4, "{rows:?}");
-        assert_eq!((number(1, 5), number(0, 1)), (0.0, 1.0));
-    }
-}
-
-#[test]
-fn boundaries_that_say_nothing_are_refused_with_their_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = write(folder.path(), "squares.obj", TWO_SQUARES);
-    let head = "group,temperature,flux,emissivity\n";
-    for (text, words) in [
-        ("group,temperature,flux\n", &["no column 'emissivity'"][..]),
-        ("floor,1,1,1\n", &[":2:", "temperature and flux"]),
-        ("floor,,,1\n", &[":2:", "neither"]),
-        ("floor,1,,1\nlid,1,,x\n", &[":3:", "emissivity 'x'", "give a number"]),
-        ("floor,1,,1\nlid,1,,\n", &[":3:", "no emissivity"]),
-        ("floor,1,,1\nfloor,2,,1\n", &[":3:", "'floor' a second time"]),
-        ("floor,1,,1\n", &["nothing of group 'lid'"]),
-        ("roof,1,,1\n*,1,,1\n", &[":2:", "group 'roof'", "not there"]),
-        ("floor,1,,1\nlid,1,,7\n", &["group 'lid'", "emissivity 7"]),
-    ] {
-        let text = if text.starts_with("group") { text.into() } else { format!("{head}{text}") };
-        let known = write(folder.path(), "known.csv", &text);
-        let [scene, known] = [&scene, &known].map(|path| path.to_str().unwrap());
-        let out = run("heat", &[scene, "--boundaries", known]);
-        let error = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(1));
-        assert!(words.iter().all(|word| error.contains(word)), "{words:?}: {error}");
-    }
-}
-
 #[test]
 fn what_takes_more_memory_than_allowed_is_refused_beforehand() {
     let folder = tempfile::tempdir().unwrap();
@@ -195,18 +135,19 @@ fn rows_of_many_machines_merge_to_the_same_bytes() {
     let view_factors = |more: &[&str]| run("view-factors", &[&common, more].concat());
     assert!(view_factors(&["--format", "npz"]).status.success());
     let whole = std::fs::read(folder.path().join("cornell_box.npz")).unwrap();
-    for rows in ["0..3", "3..17"] {
+    // 17 facets, and the back of one of them.
+    for rows in ["0..3", "3..18"] {
         let out = view_factors(&["--rows", rows]);
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     }
-    let [first, second] = ["0-3", "3-17"]
+    let [first, second] = ["0-3", "3-18"]
         .map(|rows| folder.path().join(format!("cornell_box.{rows}.rows")).display().to_string());
     let merged = run("merge", &[&second, &first, "--format", "npz"]);
     assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
     assert_eq!(std::fs::read(folder.path().join("cornell_box.npz")).unwrap(), whole);
     let alone = run("merge", &[&first]);
     assert_eq!(alone.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&alone.stderr).contains("rows of 14 groups missing"));
+    assert!(String::from_utf8_lossy(&alone.stderr).contains("rows of 15 groups missing"));
     // A checkpoint is gone on from: rows are there already.
     let out = view_factors(&["--checkpoint", &first, "--format", "npz"]);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
@@ -225,5 +166,115 @@ fn rows_of_many_machines_merge_to_the_same_bytes() {
         let out = view_factors(more);
         assert_eq!(out.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&out.stderr).contains(words));
+    }
+}
+
+/// Names of rows and columns of a square table, and its cells.
+fn table(path: &std::path::Path) -> (csv::StringRecord, Vec<csv::StringRecord>) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().clone();
+    (header, reader.records().map(Result::unwrap).collect())
+}
+
+#[test]
+fn groups_called_as_columns_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = |name: &str, k: usize| {
+        let corners = format!("v 0 0 {k}\nv 1 0 {k}\nv 1 1 {k}\nv 0 1 {k}\n");
+        format!("{corners}g {name}\nf -4 -3 -2 -1\n")
+    };
+    let scene = |name: &str, groups: &[&str]| {
+        let text: String = groups.iter().enumerate().map(|(k, g)| square(g, k)).collect();
+        write(folder.path(), name, &text)
+    };
+    for (file, groups, own) in [
+        ("a.obj", &["open", "area"][..], ["(open)", "back", "(area)"]),
+        ("b.obj", &["back", "(back)"], ["open", "((back))", "area"]),
+        ("c.obj", &["x", "open", "(open)", "area"], ["((open))", "back", "(area)"]),
+        ("d.obj", &["x", "y"], ["open", "back", "area"]),
+    ] {
+        let path = scene(file, groups);
+        let out = run("view-factors", &[path.to_str().unwrap()]);
+        let [said, warned] = texts(&out);
+        assert!(out.status.success(), "{warned}");
+        let (header, rows) = table(&path.with_extension("csv"));
+        let names: Vec<&str> = header.iter().skip(1).collect();
+        assert_eq!(names, [groups, &own].concat());
+        assert_eq!(rows.iter().map(|row| &row[0]).collect::<Vec<_>>(), groups);
+        // Rows sum to one with the table's own columns.
+        for row in &rows {
+            let shares = row.iter().skip(1).take(groups.len() + 2);
+            let sum: f64 = shares.map(|cell| cell.parse::<f64>().unwrap()).sum();
+            // Each has nine decimals.
+            assert!((sum - 1.0).abs() < 5e-10 * header.len() as f64, "{row:?}");
+        }
+        let (_, list) = table(&path.with_extension("list.csv"));
+        let ends = |own: &str| list.iter().filter(|line| &line[1] == own).count();
+        assert_eq!([own[0], own[1]].map(ends), [groups.len(); 2], "{list:?}");
+        assert!(said.contains(&format!("→ {}", own[0])), "{said}");
+        let renamed = own.iter().filter(|name| name.starts_with('(')).count();
+        assert_eq!(warned.matches("the column of this name is").count(), renamed, "{warned}");
+    }
+}
+
+#[test]
+fn flux_that_meets_backs_is_named_with_its_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let sheet = case("sheet.obj");
+    let with = |scene: &str, more: &[&str]| {
+        let done = run("view-factors", &[&[scene, "--out", out], more].concat());
+        assert!(done.status.success(), "{:?}", texts(&done));
+        texts(&done)
+    };
+    let [said, warned] = with(&sheet, &[]);
+    // Part of the floor is on the sheet's dark side.
+    let words = [
+        "backs of surfaces",
+        "floor 6.993 %",
+        "5 of 7",
+        "--two-sided \"partition_east_side\"",
+        "wrong order",
+    ];
+    assert!(words.iter().all(|word| warned.contains(word)), "{warned}");
+    assert!(!said.contains("closed"), "{said}");
+    let [said, warned] = with(&sheet, &["--two-sided", "partition_east_side"]);
+    assert!(said.contains("closed") && warned.is_empty(), "{said} {warned}");
+    // A wall that faces out, two sheets, and a merged matrix, whose scene is not there.
+    let text = std::fs::read_to_string(&sheet).unwrap();
+    let turned = text.replace("f 21 22 23 24", "f 24 23 22 21");
+    let turned = write(folder.path(), "turned.obj", &turned);
+    let [_, warned] = with(turned.to_str().unwrap(), &["--two-sided", "partition_east_side"]);
+    assert!(warned.contains("at that of east") && warned.contains("see out"), "{warned}");
+    let more = "v 1 0 0\nv 1 4 0\nv 1 4 1\nv 1 0 1\ng low\nf -4 -3 -2 -1\n";
+    let two = write(folder.path(), "two.obj", &(text + more));
+    let [_, warned] = with(two.to_str().unwrap(), &[]);
+    let options = ["--two-sided \"low\"", "--two-sided \"partition_east_side\""];
+    assert!(options.iter().any(|option| warned.contains(option)), "{warned}");
+    let [_, warned] = with(two.to_str().unwrap(), &["--two-sided", "low"]);
+    assert!(!warned.contains(options[0]) && warned.contains(options[1]), "{warned}");
+    with(&sheet, &["--rows", "0..7"]);
+    let rows = folder.path().join("sheet.0-7.rows");
+    let merged = run("merge", &[rows.to_str().unwrap()]);
+    let [_, warned] = texts(&merged);
+    assert!(warned.contains("--two-sided") && warned.contains("floor 6.993 %"), "{warned}");
+}
+
+#[test]
+fn rounding_exceeds_no_bounds() {
+    // All of the floor's flux arrives at the shell around it: 1, and a few ε more by rounding.
+    let folder = tempfile::tempdir().unwrap();
+    for (k, size) in
+        [[0.217, 7.553, 2.408], [7.545, 4.34, 5.788], [4.307, 6.498, 7.921], [2.031, 8.693, 3.982]]
+            .into_iter()
+            .enumerate()
+    {
+        let [a, b, c] = size;
+        let ring = |z: f64| format!("v 0 0 {z}\nv {a} 0 {z}\nv {a} {b} {z}\nv 0 {b} {z}\n");
+        let shell = "f 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
+        let text = format!("{}{}g floor\nf 1 2 3 4\ng shell\n{shell}", ring(0.0), ring(c));
+        let scene = write(folder.path(), &format!("{k}.obj"), &text);
+        let [said, _] = texts(&run("view-factors", &[scene.to_str().unwrap()]));
+        assert!(said.contains("bounds: kept"), "{size:?}: {said}");
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::io::{Photometry, photometry_from_bytes};
+use radiosity::io::{Photometry, PhotometrySettings, photometry_from_bytes};
 use radiosity::{Error, ErrorKind};
 
 fn read(text: &str) -> Photometry {
@@ -337,11 +337,58 @@ fn oddities_of_eulumdat_are_understood() {
     let mut bytes = plain.clone().into_bytes();
     bytes[0] = 0xdc;
     assert_eq!(photometry_from_bytes("lamp", bytes).unwrap().name, "\u{dc}irm Lamp");
-    // Two sets of lamps: the first counts.
-    let two = plain
-        .replace("\r\n80\r\n30\r\n", "\r\n80\r\n30\r\n2\r\ntubes\r\n3000\r\ncold\r\n70\r\n50\r\n");
-    let two = two.replace("\r\n0\r\n1\r\n1\r\ntube", "\r\n0\r\n2\r\n1\r\ntube");
-    assert_eq!(read(&two).intensity, whole.intensity);
+}
+
+/// [`ldt`] of an even light with these sets of lamps: how many, lm and W.
+fn with_lamp_sets(sets: &[(i32, &str, u32)]) -> String {
+    let plain = ldt(1, &[0], &[0, 90, 180], &["10", "10", "10"]);
+    let mut lines: Vec<String> = plain.lines().map(String::from).collect();
+    lines[25] = sets.len().to_string();
+    let set = |(k, (count, flux, watts)): (usize, &(i32, &str, u32))| {
+        [count.to_string(), format!("tube {k}"), flux.to_string(), "warm".into(), "80".into()]
+            .into_iter()
+            .chain([watts.to_string()])
+            .collect::<Vec<_>>()
+    };
+    lines.splice(26..32, sets.iter().enumerate().flat_map(set));
+    lines.join("\n")
+}
+
+#[test]
+fn one_of_several_sets_of_lamps_is_chosen() {
+    let choose = |text: &str, lamp_set| {
+        let mut settings = PhotometrySettings::default();
+        settings.lamp_set = lamp_set;
+        settings.read_bytes("lamp", text.as_bytes().to_vec())
+    };
+    let sets = with_lamp_sets(&[(1, "3200", 36), (2, "8600", 116), (1, "5000", 58)]);
+    let error = choose(&sets, None).unwrap_err().to_string();
+    for word in ["lamp:26", "3 sets", "2: tube 1, 8600 lm, 116 W", "--lamp-set 1 to 3"] {
+        assert!(error.contains(word), "{word}: {error}");
+    }
+    for (number, flux, watts) in [(1, 3200.0, 36.0), (2, 8600.0, 116.0), (3, 5000.0, 58.0)] {
+        let lamp = choose(&sets, Some(number)).unwrap();
+        // 10 cd/klm in all directions.
+        let lumens = lamp.intensity.flux();
+        assert!((lumens / (0.04 * PI * flux) - 1.0).abs() < 1e-13, "{lumens}");
+        assert_eq!((lamp.lamp_flux, lamp.power), (Some(flux), watts));
+    }
+    for number in [0, 4] {
+        assert!(choose(&sets, Some(number)).unwrap_err().to_string().contains("3 sets"));
+    }
+    // Sets that shine alike need no choice; a file with one takes it, whatever is chosen.
+    let alike = with_lamp_sets(&[(1, "3200", 36), (1, "3200", 30)]);
+    assert_eq!(choose(&alike, None).unwrap().power, 36.0);
+    assert_eq!(choose(&alike, Some(2)).unwrap().power, 30.0);
+    let one = with_lamp_sets(&[(1, "3200", 36)]);
+    assert_eq!(choose(&one, Some(2)).unwrap(), choose(&one, None).unwrap());
+    // Absolute intensities beside relative ones are another light.
+    let absolute = with_lamp_sets(&[(-1, "3200", 36), (1, "3200", 36)]);
+    assert!(choose(&absolute, None).is_err());
+    assert_eq!(choose(&absolute, Some(1)).unwrap().lamp_flux, None);
+    // No set at all.
+    let none = choose(&with_lamp_sets(&[]), None).unwrap();
+    assert!(warned(&none).contains("without flux"));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::io::view_factors::{write_csv_list, write_matrix_market};
-use radiosity::view_factor::{Factor, Missing};
+use radiosity::view_factor::{Factor, MatrixRows, Missing, backs_met};
 use radiosity::{ErrorKind, Scene, ViewFactors, load_obj};
 use serde_json::Value;
 
@@ -130,12 +130,35 @@ fn hidden_is_zero_and_backs_are_counted() {
     assert!((m.back[0].value + m.open[0].value - 1.0).abs() < 1e-15);
     assert_eq!(m.open_rows().len(), 3, "all see out beside one another");
 
-    // Two-sided, the same screen gives and takes below too, and no back is left.
+    assert_eq!(m.rows_that_meet_backs(), [0]);
+    let met = backs_met(&scene, &[], 0).unwrap();
+    // 65 536 rays, of which a share of 0.7 arrives: three standard deviations.
+    assert!(met.len() == 1 && met[0].group == 2, "{met:?}");
+    assert!((met[0].share - m.back[0].value).abs() < 3.0 * (0.25f64 / 65_536.0).sqrt(), "{met:?}");
+
+    // Two-sided, the same screen has a row for its back, and no back is left.
     let both = ViewFactors::new(&scene, 1e-4, &[2], keep_counting).unwrap().unwrap();
-    assert_eq!((both.areas[2], m.areas[2]), (32.0, 16.0));
-    assert!((both.factor(0, 2).value - m.back[0].value).abs() < 1e-13);
-    assert!((both.factor(2, 0).value - both.factor(0, 2).value / 32.0).abs() < 1e-15);
+    assert_eq!(both.names, ["q0", "q1", "q2", "q2 (back)"]);
+    assert_eq!(both.back_of, [None, None, None, Some(2)]);
+    assert_eq!(both.areas[2..], [16.0, 16.0]);
+    assert!((both.factor(0, 3).value - m.back[0].value).abs() < 1e-13);
+    assert!((both.factor(3, 0).value - both.factor(0, 3).value / 16.0).abs() < 1e-15);
+    assert_eq!((both.factor(0, 2).value, both.factor(2, 3).value), (0.0, 0.0));
+    assert_eq!(both.factor(1, 2).value, m.factor(1, 2).value);
     assert_eq!((both.back[0].value, both.factor(0, 1).value), (0.0, 0.0));
+    assert!(both.rows_that_meet_backs().is_empty());
+    assert!(backs_met(&scene, &[2], 0).unwrap().is_empty());
+    assert!(backs_met(&scene, &[], 3).is_err() && backs_met(&scene, &[3], 0).is_err());
+}
+
+#[test]
+fn backs_have_names_of_their_own() {
+    let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let groups = names(&["fin", "fin (back)", "(fin (back))", "a"]);
+    // In the order of the groups, each once.
+    let rows = MatrixRows::new(&groups, &[3, 0, 0]);
+    assert_eq!(rows.names[4..], ["((fin (back)))", "a (back)"]);
+    assert_eq!(rows.back_of, [None, None, None, None, Some(0), Some(3)]);
 }
 
 #[test]
@@ -155,8 +178,8 @@ fn louvres_of_zero_thickness() {
     let one = exact_view_factors(&scene, 1e-4);
     let fins: Vec<usize> = (2..12).collect();
     let two = ViewFactors::new(&scene, 1e-4, &fins, keep_counting).unwrap().unwrap();
-    let to_fins = |m: &ViewFactors| fins.iter().map(|&j| m.factor(0, j).value).sum::<f64>();
-    let (taken, errors) = (to_fins(&one) + one.back[0].value, 12.0 * 1e-5);
+    let to_fins = |m: &ViewFactors| (2..m.names.len()).map(|j| m.factor(0, j).value).sum::<f64>();
+    let (taken, errors) = (to_fins(&one) + one.back[0].value, 22.0 * 1e-5);
     assert!((taken - to_fins(&two)).abs() < errors, "{taken} {}", to_fins(&two));
     assert!((one.factor(0, 1).value - two.factor(0, 1).value).abs() < 2e-5);
     assert!(two.back.iter().all(|b| b.value == 0.0));

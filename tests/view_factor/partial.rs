@@ -114,7 +114,7 @@ fn other_scenes_and_settings_are_refused() {
     }
     assert!(PartialMatrix::merge([]).unwrap_err().to_string().contains("none"));
     let error = PartialMatrix::make(&scene, ERROR, &[], 2..7, None, &mut Alone, go).unwrap_err();
-    assert!(error.to_string().contains("2..7; the scene has 6 groups"), "{error}");
+    assert!(error.to_string().contains("2..7; the matrix has 6 rows"), "{error}");
 }
 
 #[test]

@@ -1,15 +1,20 @@
 //! `radiosity heat`: temperatures and net fluxes of groups, as a table.
 
 mod boundaries;
+mod columns;
+mod table;
+mod units;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use radiosity::heat::{HeatBalance, HeatSettings};
 use radiosity::io::read_npz;
+use radiosity::view_factor::MatrixRows;
 use radiosity::{Error, Scene, ViewFactors};
 
-use crate::args::{self, List, Stop, list, value};
+use self::units::{LENGTHS, SCALES, Scale, Temperature};
+use crate::args::{self, List, Stop, list, names, one_of};
 use crate::progress;
 use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 
@@ -17,18 +22,19 @@ use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 #[derive(Args)]
 #[command(after_help = "\
 Writes temperature (K), radiosity, irradiance and net flux out (W/m²) of each group. View factors \
-are made as `radiosity view-factors` makes them, or read from a file that it has written. Openings \
-are black and have one temperature; groups are grey in each band, and diffuse. Powers are in W \
-where lengths are in m.
+are made as `radiosity view-factors` makes them, or read from an npz file that it has written. \
+Openings are black and have one temperature; groups are grey in each band, and diffuse. A group of \
+--two-sided is a sheet: a line for each side, which have one temperature.
 
-Columns of --boundaries:
+Columns of --boundaries, in any order, with , ; or tabs between them, and decimal points or commas:
   group        its name; with --facets that of a face (GROUP/1) or of all faces of a group; * for
-               all groups that no line names
-  temperature  K; empty where the flux is given
-  flux         net flux out, W/m²; 0 for adiabatic; empty where the temperature is given
+               all groups that no line names; GROUP (back) for another emissivity of that side
+  temperature  in K, or temperature [C], [F]; empty where the flux is given
+  flux         net flux out, W/m²; 0 for adiabatic; empty where the temperature is given; of a
+               two-sided group the mean over both sides
   emissivity   0 to 1; with --bands a column a band: emissivity_1, …")]
 pub struct Options {
-    /// Scene, an OBJ file, or view factors, an npz file
+    /// Scene, an OBJ or STL file, or view factors, an npz file
     #[arg(value_name = "SCENE.obj|FACTORS.npz")]
     input: PathBuf,
     /// Boundary conditions of the groups, a CSV file
@@ -38,10 +44,17 @@ pub struct Options {
     #[arg(long, value_name = "L,…")]
     #[arg(value_parser = list::<f64>("wavelengths in µm, ascending, with commas between"))]
     bands: Option<List<f64>>,
-    /// Temperature of the surroundings, K
-    #[arg(long, value_name = "T", default_value = "0")]
-    #[arg(value_parser = value::<f64>("a temperature"))]
-    surroundings: f64,
+    /// Temperature of the surroundings, in K or with its unit: 293.15, 20C, 3K [default: 0K]
+    #[arg(long, value_name = "T", value_parser = units::temperature)]
+    #[arg(allow_hyphen_values = true)]
+    surroundings: Option<Temperature>,
+    /// Scale of temperatures that have no unit: kelvin, celsius, fahrenheit [default: kelvin;
+    /// required where one is below 150]
+    #[arg(long, value_name = "SCALE", value_parser = one_of(SCALES))]
+    temperatures: Option<Scale>,
+    /// Unit of length of the file, mm, cm, m, in or ft: gives powers in W, and areas in m²
+    #[arg(long, value_name = "UNIT", value_parser = one_of(LENGTHS))]
+    unit: Option<f64>,
     #[command(flatten)]
     factors: ToError,
     /// Change the view factors so that they keep closure and reciprocity: heat then balances
@@ -58,16 +71,6 @@ enum Source {
     Matrix(ViewFactors),
 }
 
-impl Source {
-    /// Names of the groups.
-    fn groups(&self) -> &[String] {
-        match self {
-            Source::Scene(scene) => scene.groups(),
-            Source::Matrix(matrix) => &matrix.names,
-        }
-    }
-}
-
 impl Options {
     /// Runs the command.
     pub fn run(self) -> Result<(), Stop> {
@@ -76,15 +79,16 @@ impl Options {
         args::check_writable(&out)?;
         let source = self.source()?;
         let band_edges = self.bands.clone().unwrap_or_default();
-        let settings = HeatSettings { band_edges, surroundings: self.surroundings };
+        let surroundings = match self.surroundings {
+            Some(temperature) => temperature.kelvin("--surroundings", self.temperatures)?,
+            None => 0.0,
+        };
+        let settings = HeatSettings { band_edges, surroundings };
         let bands = settings.band_edges.len() + 1;
         // Before the view factors, which may take minutes.
-        let surfaces = boundaries::read(&self.boundaries, source.groups(), bands)?;
-        let mut matrix = match source {
-            Source::Scene(scene) => self.factors.matrix(&scene)?,
-            Source::Matrix(matrix) => matrix,
-        };
-        print_checks(&matrix);
+        let rows = self.rows(&source)?;
+        let surfaces = boundaries::read(&self.boundaries, &rows, bands, self.temperatures)?;
+        let mut matrix = self.matrix(source)?;
         if self.enforce {
             matrix = enforce(&matrix);
         }
@@ -92,32 +96,94 @@ impl Options {
             HeatBalance::of(&matrix, &surfaces, &settings, |_| crate::interrupt::flow())
         })?;
         let balance = balance.ok_or(Stop::Interrupted)?;
-        print_balance(&matrix, &balance);
-        progress::of_writing(&out, |path| write(path, &matrix, &balance))?;
+        self.print_powers(&matrix, &balance);
+        print_groups(&matrix, &balance);
+        progress::of_writing(&out, |path| self.write(path, &matrix, &balance))?;
         Ok(())
     }
 
-    fn source(&self) -> Result<Source, Error> {
+    fn source(&self) -> Result<Source, Stop> {
         let path = &self.input;
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz")) {
-            return progress::of_reading(path, || read_npz(path)).map(Source::Matrix);
+            if self.factors.has_two_sided() {
+                return Err(Stop::usage("--two-sided belongs to a scene: view factors have sides"));
+            }
+            let matrix = progress::of_reading(path, || read_npz(path))?;
+            return Ok(Source::Matrix(matrix));
         }
         Ok(Source::Scene(Box::new(self.factors.scene(path)?)))
     }
+
+    /// The view factors of `source`, with their checks printed.
+    fn matrix(&self, source: Source) -> Result<ViewFactors, Stop> {
+        match source {
+            Source::Scene(scene) => {
+                let matrix = self.factors.matrix(&scene)?;
+                print_checks(&matrix);
+                self.factors.print_backs_met(&scene, &matrix)?;
+                Ok(matrix)
+            }
+            Source::Matrix(matrix) => {
+                print_checks(&matrix);
+                Ok(matrix)
+            }
+        }
+    }
+
+    /// The rows of the matrix that `source` gives.
+    fn rows(&self, source: &Source) -> Result<MatrixRows, Error> {
+        match source {
+            Source::Scene(scene) => self.factors.matrix_rows(scene),
+            Source::Matrix(matrix) => Ok(matrix.rows()),
+        }
+    }
+
+    /// Prints the balance as a whole: in W where the unit of length is known, else in W/m² of all
+    /// surfaces, which does not depend on it.
+    fn print_powers(&self, matrix: &ViewFactors, balance: &HeatBalance) {
+        let (factor, unit) = match self.unit {
+            Some(metres) => (metres * metres, "W"),
+            None => (1.0 / matrix.areas.iter().sum::<f64>(), "W/m²"),
+        };
+        let HeatBalance { supplied, lost_to_surroundings, lost_to_backs, imbalance, .. } = balance;
+        let [supplied, lost_to_surroundings, lost_to_backs, imbalance] =
+            [supplied, lost_to_surroundings, lost_to_backs, imbalance].map(|power| factor * power);
+        say!(
+            "heat: {supplied:.6e} {unit} out of groups, {lost_to_surroundings:.6e} {unit} to the \
+             surroundings, {lost_to_backs:.6e} {unit} lost to backs, {imbalance:.1e} {unit} out of \
+             balance; residual {:.1e} after {} products",
+            balance.residual,
+            balance.products
+        );
+        if self.unit.is_none() {
+            say!(
+                "  per area of all surfaces: the file has no unit of length; --unit {} gives W",
+                names(LENGTHS).join("|")
+            );
+        }
+    }
+
+    /// Writes a line a group.
+    fn write(&self, path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(), Error> {
+        let head = "group,area,temperature,radiosity,irradiance,net_flux,standard_error";
+        let head = if self.unit.is_some() { format!("{head},power") } else { head.into() };
+        let square = self.unit.map_or(1.0, |metres| metres * metres);
+        let groups = matrix.names.iter().zip(&matrix.areas).zip(&balance.groups);
+        let lines = groups.map(|((name, area), group)| {
+            let temperature = group.temperature.map_or(String::new(), |t| t.to_string());
+            let (area, flux) = (square * area, group.net_flux);
+            let numbers = [group.radiosity, group.irradiance, flux.value, flux.error];
+            let power = self.unit.map(|_| area * flux.value);
+            let start = [name.clone(), area.to_string(), temperature];
+            let numbers = numbers.into_iter().chain(power).map(|number| number.to_string());
+            start.into_iter().chain(numbers).collect()
+        });
+        args::write_file(path, &args::csv(&head, lines))
+    }
 }
 
-/// Prints the balance as a whole, and the groups if there are few.
-fn print_balance(matrix: &ViewFactors, balance: &HeatBalance) {
-    let HeatBalance { lost_to_surroundings, lost_to_backs, imbalance, .. } = balance;
-    let powers = matrix.areas.iter().zip(&balance.groups);
-    let given: f64 = powers.map(|(area, group)| (area * group.net_flux.value).max(0.0)).sum();
-    say!(
-        "heat: {given:.6e} W out of groups, {lost_to_surroundings:.6e} W to the surroundings, \
-         {lost_to_backs:.6e} W lost to backs, {imbalance:.1e} W out of balance; residual {:.1e} \
-         after {} products",
-        balance.residual,
-        balance.products
-    );
+/// Prints a line a group if there are few.
+fn print_groups(matrix: &ViewFactors, balance: &HeatBalance) {
     if matrix.names.len() > MAX_PRINTED {
         return;
     }
@@ -128,18 +194,4 @@ fn print_balance(matrix: &ViewFactors, balance: &HeatBalance) {
         let flux = group.net_flux;
         say!("{name:>width$} {temperature:>12} {:14.6} {:9.1e}", flux.value, flux.error);
     }
-}
-
-/// Writes a line a group.
-fn write(path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(), Error> {
-    let head = "group,area,temperature,radiosity,irradiance,net_flux,standard_error";
-    let groups = matrix.names.iter().zip(&matrix.areas).zip(&balance.groups);
-    let lines = groups.map(|((name, area), group)| {
-        let temperature = group.temperature.map_or(String::new(), |t| t.to_string());
-        let flux = group.net_flux;
-        let numbers = [group.radiosity, group.irradiance, flux.value, flux.error];
-        let start = [name.clone(), area.to_string(), temperature];
-        start.into_iter().chain(numbers.map(|number| number.to_string())).collect()
-    });
-    args::write_file(path, &args::csv(head, lines))
 }

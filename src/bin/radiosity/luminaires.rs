@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use clap::Args;
 use radiosity::glam::DVec3;
-use radiosity::io::{Photometry, read_photometry};
+use radiosity::io::{Photometry, PhotometrySettings};
 use radiosity::scene::Luminaire;
 use radiosity::{Error, ErrorKind, Rgb, Scene};
 use serde_json::{Value as Json, json};
 
-use crate::args::{self, Parsed, give};
+use crate::args::{self, Parsed, give, value};
 
 /// What `--luminaire` takes.
 const LUMINAIRE: &str =
@@ -28,6 +28,10 @@ pub struct LuminaireOptions {
     /// where needed; files are in the folder of the list; may be repeated
     #[arg(long, value_name = "LIST.json", hide = true)]
     luminaires: Vec<PathBuf>,
+    /// Set of lamps, from 1, of EULUMDAT files with several, which are alternatives
+    #[arg(long, value_name = "N", value_parser = value::<usize>("a whole number from 1"))]
+    #[arg(hide = true)]
+    lamp_set: Option<usize>,
     /// Metres in the scene's unit, for luminaires: 0.001 for millimetres
     #[arg(long, value_name = "METRES", default_value = "1", value_parser = metres)]
     metres_per_unit: f64,
@@ -49,6 +53,7 @@ pub struct Luminaires {
     placed: Vec<(Given, Arc<Photometry>)>,
     /// Each file that was read.
     files: Vec<(PathBuf, Arc<Photometry>)>,
+    settings: PhotometrySettings,
     metres_per_unit: f64,
 }
 
@@ -56,10 +61,12 @@ impl LuminaireOptions {
     /// Reads the files of luminaires.
     ///
     /// # Errors
-    /// Those of [`read_photometry`]; [`ErrorKind`] `File` and `Setting` for lists.
+    /// Those of [`PhotometrySettings::read`]; [`ErrorKind`] `File` and `Setting` for lists.
     pub fn read(&self) -> Result<Luminaires, Error> {
         let metres_per_unit = self.metres_per_unit;
-        let mut read = Luminaires { placed: vec![], files: vec![], metres_per_unit };
+        let mut settings = PhotometrySettings::default();
+        settings.lamp_set = self.lamp_set;
+        let mut read = Luminaires { placed: vec![], files: vec![], settings, metres_per_unit };
         for given in &self.luminaire {
             read.place(given.clone())?;
         }
@@ -145,7 +152,7 @@ impl Luminaires {
         if let Some((_, known)) = self.files.iter().find(|(path, _)| path == file) {
             return Ok(known.clone());
         }
-        let photometry = Arc::new(read_photometry(file)?);
+        let photometry = Arc::new(self.settings.read(file)?);
         self.files.push((file.into(), photometry.clone()));
         Ok(photometry)
     }

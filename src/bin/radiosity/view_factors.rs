@@ -3,6 +3,7 @@
 mod check;
 mod files;
 pub mod merge;
+mod report;
 mod rows;
 
 use std::ops::Range;
@@ -13,8 +14,9 @@ use clap::Args;
 use files::MatrixOptions;
 use radiosity::io::SpecularSurfaces;
 use radiosity::scene::{Warning, WarningKind};
-use radiosity::view_factor::{ErrorStats, Estimate};
+use radiosity::view_factor::{MatrixRows, backs_met};
 use radiosity::{Error, ErrorKind, ObjSettings, Scene, ViewFactors};
+pub use report::print_checks;
 
 use crate::args::{self, Stop, value};
 use crate::progress;
@@ -28,9 +30,11 @@ pub const MAX_PRINTED: usize = 16;
 Writes the view factors of each file and prints them, with standard errors and with closure, \
 reciprocity and bounds of the raw numbers. F[i, j] is the share of the flux leaving group i (row) \
 that arrives at group j (column); `open` is the share that leaves the scene, `back` the share that \
-arrives at the backs of surfaces.")]
+arrives at the backs of surfaces. A group of --two-sided has two rows and columns: GROUP, its \
+front, and GROUP (back). Where a group is called `open`, `back` or `area`, it is the table's own \
+column that is called (open), (back) or (area).")]
 pub struct Options {
-    /// Scenes, OBJ files
+    /// Scenes, OBJ or STL files
     #[arg(value_name = "SCENE.obj", required = true)]
     scenes: Vec<PathBuf>,
     #[command(flatten)]
@@ -62,7 +66,7 @@ pub struct ToError {
     /// Absolute error of every factor, two standard errors
     #[arg(long, value_name = "E", default_value = "1e-4", value_parser = value::<f64>("a number"))]
     error: f64,
-    /// Group that emits and receives on both sides; its area is that of both; may be repeated
+    /// Group that emits and receives on both sides, a row each; may be repeated
     #[arg(long, value_name = "GROUP")]
     two_sided: Vec<String>,
     /// File that the finished rows are kept in, every few seconds and at Ctrl-C; it is resumed from
@@ -78,13 +82,47 @@ pub struct ToError {
 }
 
 impl ToError {
-    /// The scene of an OBJ file, in which mirrors and glass are surfaces as all others are.
+    /// The scene of a file, in which mirrors and glass are surfaces as all others are. Prints what
+    /// was odd about it.
     pub fn scene(&self, path: &Path) -> Result<Scene, Error> {
         let mut obj = ObjSettings::default();
         obj.specular = SpecularSurfaces::Ignore;
         obj.facets = self.facets;
         obj.strict = self.strict;
-        progress::of_reading(path, || obj.load(path))
+        let scene = progress::of_reading(path, || obj.load(path))?;
+        let of_light = |w: &&Warning| {
+            matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
+        };
+        for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
+            eprintln!("warning: {warning}");
+        }
+        Ok(scene)
+    }
+
+    /// Whether some group has two sides.
+    pub fn has_two_sided(&self) -> bool {
+        !self.two_sided.is_empty()
+    }
+
+    /// The rows of the matrix of `scene`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a two-sided group that is not in the scene.
+    pub fn matrix_rows(&self, scene: &Scene) -> Result<MatrixRows, Error> {
+        let two_sided = group_indices(scene, &self.two_sided, self.facets)?;
+        Ok(MatrixRows::new(scene.groups(), &two_sided))
+    }
+
+    /// Warns where flux arrives at backs of `scene`, and says of which groups.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Setting`] for a two-sided group that is not in the scene.
+    pub fn print_backs_met(&self, scene: &Scene, matrix: &ViewFactors) -> Result<(), Error> {
+        let Some(&worst) = matrix.rows_that_meet_backs().first() else { return Ok(()) };
+        let two_sided = group_indices(scene, &self.two_sided, self.facets)?;
+        let met = backs_met(scene, &two_sided, worst)?;
+        report::print_backs_met(matrix, scene, worst, &met);
+        Ok(())
     }
 }
 
@@ -117,13 +155,8 @@ impl Options {
             args::check_writable(&format.path(&stem))?;
         }
         let scene = self.to_error.scene(path)?;
-        let formats = self.matrix.formats_for(scene.groups().len(), &stem)?;
-        let of_light = |w: &&Warning| {
-            matches!(w.kind, WarningKind::NoLight | WarningKind::FaceWithoutMaterial)
-        };
-        for warning in scene.warnings().iter().filter(|w| !of_light(w)) {
-            eprintln!("warning: {warning}");
-        }
+        let groups = self.to_error.matrix_rows(&scene)?.names.len();
+        let formats = self.matrix.formats_for(groups, &stem)?;
         if let Some(rows) = &self.rows {
             return self.to_error.write_rows(&scene, rows.clone(), &stem);
         }
@@ -131,9 +164,9 @@ impl Options {
         let mut matrix = self.to_error.matrix(&scene)?;
         let seconds = start.elapsed().as_secs_f64();
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
-        let groups = matrix.names.len();
         say!("{}: {groups} groups, {nonzeros} nonzeros, {seconds:.3} s", path.display());
         print_checks(&matrix);
+        self.to_error.print_backs_met(&scene, &matrix)?;
         self.check(&scene, &matrix)?;
         if self.matrix.enforce {
             matrix = enforce(&matrix);
@@ -154,8 +187,9 @@ impl Options {
 
 /// Prints the factors if they are few, and writes them in all of `formats`.
 fn write_all(formats: &[files::Format], stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
+    report::print_column_names(matrix);
     if matrix.names.len() <= MAX_PRINTED {
-        print_factors(matrix);
+        report::print_factors(matrix);
     }
     for format in formats {
         progress::of_writing(&format.path(stem), |_| format.write(stem, matrix))?;
@@ -202,64 +236,4 @@ fn group_indices(scene: &Scene, names: &[String], facets: bool) -> Result<Vec<us
         }
     }
     Ok(indices)
-}
-
-/// Prints closure, reciprocity and bounds of the raw numbers, and which groups see out.
-pub fn print_checks(m: &ViewFactors) {
-    let checks = m.checks();
-    let name = |i: usize| &m.names[i];
-    let (r, b) = (checks.reciprocity, checks.bounds);
-    say!("closure: {:.1e} RMS, {:.1e} worst", checks.closure.rms, checks.closure.max);
-    say!("reciprocity: {:.1e} RMS, {:.1e} worst", r.rms, r.max);
-    if b.max > 0.0 {
-        let (from, to) = (name(b.at.0), name(b.at.1));
-        say!("bounds: exceeded by up to {:.1e}, from {from} to {to}", b.max);
-    } else {
-        say!("bounds: kept");
-    }
-    let ErrorStats { max: excess, at: (row, _), .. } = checks.row_sums;
-    // Above the rounding of sums of thousands of factors.
-    if excess > 1e-12 {
-        let error = m.open[row].error;
-        say!("sums of rows: above 1 by up to {excess:.1e} ± {error:.1e}, in {}", name(row));
-    } else {
-        say!("sums of rows: none above 1");
-    }
-    if let Some(&worst) = m.rows_over_unity().first() {
-        eprintln!(
-            "warning: more than all of {}'s flux arrives, {:.3e} too much: are two surfaces in one \
-             place?",
-            name(worst),
-            -m.open[worst].value
-        );
-    }
-    let leaks = m.open_rows();
-    if let Some(&worst) = leaks.first() {
-        eprintln!(
-            "warning: {} of {} groups see out of the scene; {} loses most, {:.3e}",
-            leaks.len(),
-            m.names.len(),
-            name(worst),
-            m.open[worst].value
-        );
-    } else {
-        say!("closed: no group sees out");
-    }
-}
-
-/// Prints the factors of every group, each with its error.
-fn print_factors(m: &ViewFactors) {
-    let width = m.names.iter().map(|n| n.chars().count()).max().unwrap_or(0).max(4);
-    say!("{:>width$} → {:<width$} {:>12} {:>9}", "from", "to", "F", "± error");
-    let line = |from: &str, to: &str, e: Estimate| {
-        say!("{from:>width$} → {to:<width$} {:12.9} {:9.1e}", e.value, e.error);
-    };
-    for (i, from) in m.names.iter().enumerate() {
-        for f in &m.factors[i] {
-            let e = Estimate { value: f.value, error: f.error };
-            line(from, &m.names[f.to as usize], e);
-        }
-        line(from, "open", m.open[i]);
-        line(from, "back", m.back[i]);
-    }
 }

@@ -8,7 +8,7 @@
 //! | 9 | name |
 //! | 16 to 21 | opening: length or diameter, width or 0, heights at C = 0°, 90°, 180°, 270°, mm |
 //! | 24 | factor for the intensities |
-//! | 26 | sets of lamps; six lines of each: number, kind, flux, colour, rendering, watts |
+//! | 26 | sets of lamps, see [`lamp_set`]; six lines of each |
 //! | then | ten direct ratios, C-angles, γ-angles, intensities in cd/klm plane by plane |
 //!
 //! Length is along C = 90°, width along C = 0°.
@@ -18,6 +18,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::super::text::{Line, finite, physical_lines, place};
+use super::lamp_set::{self, LampSet};
 use super::numbers::{Comma, Numbers};
 use super::planes::{ANGLE_TOLERANCE, Planes};
 use super::{Photometry, name_of};
@@ -27,17 +28,21 @@ use crate::scene::{Opening, Pole};
 /// Lines before those of the sets of lamps.
 const HEADER: usize = 26;
 
-pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
+pub fn read(file: &Path, text: &str, lamp_set: Option<usize>) -> Result<Photometry, Error> {
     let mut warnings = vec![];
     let mut rest = physical_lines(file, text);
     let lines: Vec<Line> = rest.by_ref().take(HEADER).collect();
     let field = |number: usize| Field { file, number, line: lines.get(number - 1) };
     let Header { symmetry, planes, angles, opening, mut factor, sets } =
         Header::read(&field, &mut warnings)?;
-    let lamps: Vec<Line> = rest.by_ref().take(6 * sets).collect();
-    let lamp = |k: usize| Field { file, number: HEADER + k, line: lamps.get(k - 1) };
-    let is_absolute = lamp(1).number_or_zero() < 0.0;
-    let flux = lamp(3).number_or_zero().abs();
+    let lines_of_sets: Vec<Line> = rest.by_ref().take(LampSet::LINES * sets).collect();
+    let lamp = |k: usize| Field { file, number: HEADER + 1 + k, line: lines_of_sets.get(k) };
+    let text = |k: usize| lamp(k).text().to_string();
+    let number = |k: usize| lamp(k).number_or_zero();
+    let sets: Vec<LampSet> = (0..sets).map(|set| LampSet::new(set, text, number)).collect();
+    let set = lamp_set::choose(&sets, lamp_set);
+    let LampSet { flux, is_absolute, power, .. } =
+        set.map_err(|(found, remedy)| field(26).error(found, &remedy))?;
     if flux > 0.0 {
         factor *= flux / 1000.0;
     } else {
@@ -59,7 +64,7 @@ pub fn read(file: &Path, text: &str) -> Result<Photometry, Error> {
         intensity: intensity.into(),
         opening,
         lamp_flux: (!is_absolute && flux > 0.0).then_some(flux),
-        power: lamp(6).number_or_zero().max(0.0),
+        power,
         warnings,
     })
 }

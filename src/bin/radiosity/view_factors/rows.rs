@@ -29,8 +29,8 @@ pub fn memory(text: &str) -> Parsed<f64> {
 impl ToError {
     /// The whole matrix.
     pub fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
-        let rows = self.rows(scene, 0..scene.groups().len())?;
-        Ok(rows.into_matrix()?)
+        let all = 0..self.matrix_rows(scene)?.names.len();
+        Ok(self.rows(scene, all)?.into_matrix()?)
     }
 
     /// Makes `rows` and writes them, beside others with this `stem`.
