@@ -208,6 +208,13 @@ impl Library {
         }
     }
 
+    /// Names of the `used` materials that are `odd`.
+    fn names(&self, used: &HashSet<u32>, odd: &dyn Fn(&MtlMaterial) -> bool) -> Vec<&str> {
+        let all = self.materials.iter().enumerate();
+        let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
+        odd.map(|(_, m)| m.name.as_str()).collect()
+    }
+
     /// Warns of statements of `used` materials that are not modelled, or only partly.
     /// `emit` are those that the caller lets emit.
     pub fn warn(
@@ -217,11 +224,7 @@ impl Library {
         emit: &[(String, Rgb)],
         repairs: &mut Repairs,
     ) {
-        let names = |odd: &dyn Fn(&MtlMaterial) -> bool| {
-            let all = self.materials.iter().enumerate();
-            let odd = all.filter(|(i, m)| used.contains(&(*i as u32)) && odd(m));
-            odd.map(|(_, m)| m.name.as_str()).collect::<Vec<_>>()
-        };
+        let names = |odd: &dyn Fn(&MtlMaterial) -> bool| self.names(used, odd);
         let redefined: Vec<&str> = self.redefined.iter().map(String::as_str).collect();
         let is_specular = |m: &MtlMaterial| m.specular.is_some();
         let shown = surfaces != SpecularSurfaces::Ignore;

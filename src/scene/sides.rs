@@ -69,8 +69,7 @@ impl Scene {
         let kept = (0..treatments.len()).filter(is_kept).map(|t| (t, false));
         let twins = (0..treatments.len()).filter(is_doubled).map(|t| (t, true));
         for (t, is_twin) in kept.chain(twins) {
-            let mut triangle = self.triangles[t];
-            let mut coordinates = self.texture_coordinates(t);
+            let (mut triangle, mut coordinates) = (self.triangles[t], self.texture_coordinates(t));
             let mut cut = self.cut_sides.get(t).copied();
             if treatments[t].turned != is_twin {
                 triangle.corners.swap(1, 2);
@@ -79,8 +78,8 @@ impl Scene {
                 cut.iter_mut().for_each(|sides| sides.swap(0, 2));
             }
             let material = triangle.material;
-            let is_dark = is_twin && !treatments[t].shines_on_both;
-            if is_dark && self.materials[material as usize].exitance != Rgb::ZERO {
+            let emits = self.materials[material as usize].exitance != Rgb::ZERO;
+            if is_twin && emits && !treatments[t].shines_on_both {
                 triangle.material = *dark.entry(material).or_insert_with(|| {
                     let index = scene.materials.len() as u32;
                     let without = scene.materials[material as usize].clone();

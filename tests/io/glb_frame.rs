@@ -72,7 +72,7 @@ fn is_placed(light: &GatheredMesh, found: &[[Vec3; 2]], turn: DQuat, metres: f64
 fn write(light: &GatheredMesh, change: impl Fn(&mut GlbSettings)) -> Vec<[Vec3; 2]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
-    let mut settings = GlbSettings::from(ToneCurve::fit(&light.surface.radiosity));
+    let mut settings = GlbSettings::from(&ToneCurve::fit(&light.surface.radiosity));
     change(&mut settings);
     write_glb(&path, light, settings).unwrap();
     shown(&path)

@@ -66,7 +66,7 @@ fn written(parts: &[Part<'_>], size: f64) -> Vec<Face> {
     let light = GatheredMesh::from_elements(&mesh, &light).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
-    let mut settings = GlbSettings::from(ToneCurve::fit(&light.surface.radiosity));
+    let mut settings = GlbSettings::from(&ToneCurve::fit(&light.surface.radiosity));
     settings.error = 0.01;
     write_glb(&path, &light, settings).unwrap();
     let mut faces = read(&path);

@@ -28,12 +28,6 @@ impl From<&ToneCurve> for GlbSettings {
     }
 }
 
-impl From<ToneCurve> for GlbSettings {
-    fn from(tone: ToneCurve) -> GlbSettings {
-        GlbSettings::from(&tone)
-    }
-}
-
 impl GlbSettings {
     /// The top node for positions of `scene` relative to `origin`, scene unit: glTF has metres and
     /// +Y up. All vertices keep the scene's axes and unit, so that they keep their digits.

@@ -43,6 +43,7 @@ pub(super) struct TwoSides {
 
 impl TwoSides {
     /// With a gap between all of them.
+    #[cfg(feature = "light-map")]
     pub fn apart(scene: &Scene) -> TwoSides {
         let mut sides = TwoSides::default();
         sheets(scene).iter().for_each(|sheet| sides.move_apart(scene, sheet));

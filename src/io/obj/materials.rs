@@ -258,6 +258,23 @@ impl MtlMaterial {
         self.specular(settings).map_or(1.0, |specular| 1.0 - specular.share().max_element())
     }
 
+    /// The part of `reflectance` that is diffuse beside a mirror or glass.
+    fn beside(
+        &self,
+        specular: Specular,
+        reflectance: Rgb,
+        note: &mut impl FnMut(WarningKind, String) -> Result<(), Error>,
+    ) -> Result<Rgb, Error> {
+        let share = specular.share();
+        if self.is_metal() {
+            return Ok((reflectance - share).max(Rgb::ZERO));
+        }
+        if (reflectance + share).max_element() > 1.0 && !specular.is_glass() {
+            note(WarningKind::MoreThanAll, "`Kd` is limited to 1 - `Ks`".into())?;
+        }
+        Ok(reflectance.min(Rgb::ONE - share))
+    }
+
     /// As a material of a scene, without its name; `note` is called with every repair.
     fn complete(
         &self,
@@ -298,13 +315,7 @@ impl MtlMaterial {
         }
         let exitance = if exitance.is_finite() { exitance } else { Rgb::ZERO };
         if let Some(specular) = specular {
-            let share = specular.share();
-            if self.is_metal() {
-                reflectance = (reflectance - share).max(Rgb::ZERO);
-            } else if (reflectance + share).max_element() > 1.0 && !specular.is_glass() {
-                note(WarningKind::MoreThanAll, "`Kd` is limited to 1 - `Ks`".into())?;
-            }
-            reflectance = reflectance.min(Rgb::ONE - share);
+            reflectance = self.beside(specular, reflectance, note)?;
         }
         if self.is_black(settings) {
             reflectance = Rgb::ZERO;

@@ -42,7 +42,8 @@ impl<'a> LampBacks<'a> {
         let free = sheets.sample(&sides, |side, rng| {
             let width = boxes[&sheets.first(side)].diagonal();
             let start = walks.random_start(side, rng)?;
-            walk(walks, start, side, width, rng)
+            let is_dark = |side: SideIndex| dark.get(&(side / 2)) == Some(&side);
+            walk(walks, (start, side), width, is_dark, rng)
         });
         LampBacks { dark, free }
     }
@@ -72,22 +73,30 @@ impl<'a> LampBacks<'a> {
     }
 }
 
-/// A random walk from a point on a lamp's `side`: 1 if it leaves the scene after it met a surface,
-/// 0 if it met one farther away than the lamp is wide, none otherwise.
-fn walk(walks: &Walks, start: DVec3, side: SideIndex, width: f64, rng: &mut Rng) -> Option<f64> {
-    let (mut at, mut on) = (start, side);
+/// A random walk from a point on the dark side of a lamp until it meets such a side again: 1 if it
+/// leaves the scene after it met a surface, 0 if it met one farther away than the lamp is wide, none
+/// otherwise.
+fn walk(
+    walks: &Walks,
+    start: (DVec3, SideIndex),
+    width: f64,
+    is_dark: impl Fn(SideIndex) -> bool,
+    rng: &mut Rng,
+) -> Option<f64> {
+    let (mut at, mut side) = start;
     let (mut has_met, mut is_far) = (false, false);
     // As many bounces as other walks have.
     for _ in 0..16 {
-        let direction = walks.random_direction(on, rng);
-        let Some((next, next_side)) = walks.next(at, on, direction) else {
+        let direction = walks.random_direction(side, rng);
+        let Some((next, next_side)) = walks.next(at, side, direction) else {
             return has_met.then_some(1.0);
         };
-        if !walks.is_lamp(next_side / 2) {
-            has_met = true;
-            is_far |= next.distance(start) > width;
+        if is_dark(next_side) {
+            break;
         }
-        (at, on) = (next, next_side);
+        has_met = true;
+        is_far |= next.distance(start.0) > width;
+        (at, side) = (next, next_side);
     }
     is_far.then_some(0.0)
 }

@@ -97,11 +97,6 @@ impl<'a> Walks<'a> {
         self.shining_backs.get(&t).copied()
     }
 
-    /// Whether triangle `t` emits.
-    pub fn is_lamp(&self, t: usize) -> bool {
-        self.shining_backs.contains_key(&t)
-    }
-
     /// Whether `side` emits.
     fn emits(&self, side: SideIndex) -> bool {
         let (t, is_back) = (side / 2, side % 2 == 1);
