@@ -13,9 +13,10 @@ use radiosity::io::read_npz;
 use radiosity::view_factor::MatrixRows;
 use radiosity::{Error, Scene, ViewFactors};
 
-use self::units::{LENGTHS, SCALES, Scale, Temperature};
+use self::units::{SCALES, Scale, Temperature};
 use crate::args::{self, List, Stop, list, names, one_of};
 use crate::progress;
+use crate::scene_options::UNITS;
 use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 
 /// Solves the radiative heat balance of groups by their view factors
@@ -53,7 +54,7 @@ pub struct Options {
     #[arg(long, value_name = "SCALE", value_parser = one_of(SCALES))]
     temperatures: Option<Scale>,
     /// Unit of length of the file, mm, cm, m, in or ft: gives powers in W, and areas in m²
-    #[arg(long, value_name = "UNIT", value_parser = one_of(LENGTHS))]
+    #[arg(long, value_name = "UNIT", value_parser = one_of(UNITS))]
     unit: Option<f64>,
     #[command(flatten)]
     factors: ToError,
@@ -158,7 +159,7 @@ impl Options {
         if self.unit.is_none() {
             say!(
                 "  per area of all surfaces: the file has no unit of length; --unit {} gives W",
-                names(LENGTHS).join("|")
+                names(UNITS).join("|")
             );
         }
     }

@@ -16,10 +16,6 @@ pub enum Scale {
 pub const SCALES: Names<Scale> =
     &[("kelvin", Scale::Kelvin), ("celsius", Scale::Celsius), ("fahrenheit", Scale::Fahrenheit)];
 
-/// Metres in the units of length, by their names.
-pub const LENGTHS: Names<f64> =
-    &[("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)];
-
 /// Temperatures without a unit below this may be in degrees Celsius: rooms, skies and boilers are;
 /// what is colder than this in kelvin, as cryostats and space are, is rare. Plain choice.
 pub const SURELY_KELVIN: f64 = 150.0;
