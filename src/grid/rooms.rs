@@ -57,7 +57,7 @@ impl<'a> FloorRaster<'a> {
         let [u, v] = plane.edges;
         let normal = u.cross(v).normalize_or_zero();
         let counts = plane.edges.map(|edge| (edge.length() / (CELL * metre)).ceil().max(1.0));
-        if counts.iter().any(|&count| !(count <= MAX_CELLS)) {
+        if !counts.iter().all(|&count| count <= MAX_CELLS) {
             return None;
         }
         let counts = counts.map(|count| count as usize);

@@ -149,6 +149,23 @@ impl Sky {
         }
     }
 
+    /// Irradiance of a surface with unit `normal` that sees all of its half of the sky, W/m² per
+    /// channel: without the sun. Of 2¹⁸ directions, dense as the cosine.
+    pub fn irradiance(&self, normal: DVec3) -> Rgb {
+        if let Some(radiance) = self.uniform_radiance() {
+            return PI * radiance;
+        }
+        let count = 512;
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let radiance = |k: u32| {
+            let [square, turn] = [k / count, k % count].map(|k| (f64::from(k) + 0.5) / 512.0);
+            let (sine, cosine) = (TAU * turn).sin_cos();
+            let across = square.sqrt() * (tangent * cosine + bitangent * sine);
+            self.radiance(across + normal * (1.0 - square).sqrt())
+        };
+        (0..count * count).map(radiance).sum::<Rgb>() * (PI / f64::from(count * count))
+    }
+
     /// Whether it has neither radiance nor a sun.
     pub fn is_black(&self) -> bool {
         self.brightest() == 0.0 && self.sun.is_none()

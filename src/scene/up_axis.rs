@@ -141,7 +141,7 @@ mod tests {
         let groups = names.map(String::from).to_vec();
         let (positions, grey) = ((0..8).map(at).collect(), vec![Material::grey("grey", 0.5)]);
         let scene = Scene::new(positions, triangles.collect(), groups, grey).unwrap();
-        scene.with_comments(comments.iter().map(|line| line.to_string()).collect())
+        scene.with_comments(comments.iter().map(ToString::to_string).collect())
     }
 
     fn up(scene: &Scene, luminaires: &[(DVec3, Option<DVec3>)]) -> (DVec3, bool) {

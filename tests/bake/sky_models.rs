@@ -65,6 +65,18 @@ fn check(found: [IrradianceSample; 2], truth: Rgb, share: f64) {
 /// what changes by all of itself over 90°, the second differences over them are below 1e-4.
 const SMOOTH: f64 = 1e-4;
 
+/// 7π/9 times the zenith for the ground (Moon and Spencer 1942), π for a uniform sky; a wall sees
+/// half of the sky: by the pieces of 0.3 degrees.
+#[test]
+fn unoccluded_irradiance_is_that_of_closed_forms() {
+    for up in [DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, -1.0).normalize()] {
+        let ground = overcast(up).irradiance(up) / overcast(up).radiance(up);
+        assert!((ground / (7.0 * PI / 9.0) - 1.0).length() < 1e-4, "{ground}");
+    }
+    let even = Sky::uniform(Rgb::new(1.0, 2.0, 3.0));
+    assert_eq!(even.irradiance(DVec3::X), PI * Rgb::new(1.0, 2.0, 3.0));
+}
+
 #[test]
 fn an_overcast_sky_lights_ground_and_walls_by_its_closed_form() {
     // L_z (1 + 2 cos Z)/3 over the hemisphere: 7π/9 L_z, and over the upper half of that of a wall

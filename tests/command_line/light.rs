@@ -30,7 +30,7 @@ fn number(word: &str) -> f64 {
 fn grid_measures_above_each_floor_and_above_groups() {
     let folder = tempfile::tempdir().unwrap();
     let scene = ground(folder.path());
-    let mut args = vec![scene.to_str().unwrap(), "--metre", "1000", "--photometric"];
+    let mut args = vec![scene.to_str().unwrap(), "--unit", "mm", "--photometric"];
     args.extend(["--sky", "100", "--up", "0,0,1"]);
     args.extend(device());
     let out = run("grid", &args);

@@ -58,7 +58,7 @@ fn luminaires_light_a_room_and_are_told() {
     let list = write(folder.path(), "lamps.json", list).display().to_string();
     let large = room(6).lines().map(in_mm).collect::<Vec<_>>().join("\n");
     let large = write(folder.path(), "large.obj", &large);
-    let (same, report, _) = baked(&large, &["--luminaires", &list, "--metres-per-unit", "0.001"]);
+    let (same, report, _) = baked(&large, &["--luminaires", &list, "--unit", "mm"]);
     assert_eq!(report["luminaires"].as_array().unwrap().len(), 2);
     let brightest = |s: &radiosity::VertexMesh| s.radiosity.iter().map(|b| b.x).fold(0.0, f64::max);
     let ratio = brightest(&same) / brightest(&solution);
@@ -91,7 +91,7 @@ fn wrong_luminaires_are_refused() {
         ("--luminaire", "nothing.ies@1,2,3".into(), "nothing.ies"),
         ("--luminaires", "nothing.json".into(), "nothing.json"),
         ("--luminaires", scene.clone(), "\"at\""),
-        ("--metres-per-unit", "0".into(), "above 0"),
+        ("--unit", "0".into(), "above 0"),
     ] {
         refused(&[&scene, option, &value], &[words]);
     }

@@ -144,6 +144,7 @@ impl Bake {
     fn bake_file(mut self, path: &Path) -> Result<Report, Error> {
         let start = Instant::now();
         self.files.name_after(path)?;
+        self.files.metres = self.reading.unit;
         let Input { scene, luminaires, mut warnings, .. } = self.reading.read(path)?;
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;

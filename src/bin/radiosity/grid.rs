@@ -49,9 +49,6 @@ pub struct Options {
     /// the longer side, or the shorter one where the longer is twice as long or more]
     #[arg(long, value_name = "P", value_parser = value::<f64>(METRES))]
     spacing: Option<f64>,
-    /// Length of a metre in the scene's unit: 1000 for millimetres
-    #[arg(long, value_name = "X", default_value = "1", value_parser = value::<f64>("a length"))]
-    metre: f64,
     /// Measure illuminance, lx: `Ke` and skies are luminances, cd/m², of which 0.2126 are of r,
     /// 0.7152 of g and 0.0722 of b. Without it: irradiance, W/m², the mean of the channels
     #[arg(long)]
@@ -83,10 +80,16 @@ impl Options {
         let light = self.light.bake(scene)?;
         let mut measured = self.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
         let is_reached = self.correct(&mut measured, &light)?.ok_or(Stop::Interrupted)?;
-        self.write(&grids, &measured)?;
+        let outdoors = self.outdoors(light.baked.light.mesh.scene());
+        self.write(&grids, &measured, outdoors)?;
         progress::print_written();
         self.light.print_outcome(is_reached);
         args::end_at(is_reached)
+    }
+
+    /// Length of a metre in the scene's unit.
+    fn metre(&self) -> f64 {
+        1.0 / self.light.reading.unit
     }
 
     fn quantity(&self) -> Quantity {
@@ -95,7 +98,7 @@ impl Options {
 
     fn settings(&self, strip: f64) -> GridSettings {
         let strip = self.strip.unwrap_or(strip);
-        GridSettings { metre: self.metre, strip, spacing: self.spacing }
+        GridSettings { metre: self.metre(), strip, spacing: self.spacing }
     }
 
     /// Where it is measured.
@@ -108,7 +111,7 @@ impl Options {
             let grids = MeasuringGrid::above_floors(scene, up, height, &floor)?;
             if grids.is_empty() {
                 let found = format!("nothing is large enough where {up} is up");
-                let remedy = "name a --group or give a --plane; --metre tells the scene's unit";
+                let remedy = "name a --group or give a --plane; --unit is that of the scene";
                 return Err(Error::new(ErrorKind::Setting, "floors of the scene", found, remedy));
             }
             return Ok(grids.into_iter().map(|grid| raised(grid, height)).collect());
@@ -166,7 +169,21 @@ impl Options {
         })
     }
 
-    fn write(&self, grids: &[Placed], measured: &[MeasuredGrid]) -> Result<(), Error> {
+    /// What a level surface without anything around receives, where the daylight factor is defined:
+    /// under an overcast sky alone.
+    fn outdoors(&self, scene: &Scene) -> Option<f64> {
+        let is_alone = !scene.has_emitter() && scene.luminaires().is_empty();
+        let is_overcast = self.light.reading.sky.is_overcast() && scene.sky().sun().is_none();
+        let irradiance = self.quantity().of(scene.sky().irradiance(scene.up()));
+        (is_alone && is_overcast && irradiance > 0.0).then_some(irradiance)
+    }
+
+    fn write(
+        &self,
+        grids: &[Placed],
+        measured: &[MeasuredGrid],
+        outdoors: Option<f64>,
+    ) -> Result<(), Error> {
         for (k, ((place, _), measured)) in grids.iter().zip(measured).enumerate() {
             let name = format!("{} {}", k + 1, measured.grid.name);
             let Some(statistics) = measured.statistics(self.quantity()) else {
@@ -174,8 +191,18 @@ impl Options {
                 continue;
             };
             say!("{}", self.line(&name, measured, &statistics));
+            if let Some(outdoors) = outdoors {
+                let [mean, least] =
+                    [statistics.mean, statistics.minimum].map(|value| 100.0 * value / outdoors);
+                let unit = self.quantity().unit();
+                say!(
+                    "{name}: daylight factor mean {mean:.2} %, minimum {least:.2} %, of {} {unit} \
+                     outdoors",
+                    three_digits(outdoors)
+                );
+            }
             let number = if grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
-            let (quantity, metre) = (self.quantity(), self.metre);
+            let (quantity, metre) = (self.quantity(), self.metre());
             let picture = Picture { measured, statistics: &statistics, quantity, place, metre };
             let png = picture.png().map_err(|found| {
                 Error::new(ErrorKind::File, "the picture of a grid", found, "please report it")
@@ -188,7 +215,7 @@ impl Options {
     fn line(&self, name: &str, measured: &MeasuredGrid, statistics: &GridStatistics) -> String {
         let GridStatistics { points, mean, mean_error, minimum, maximum, uniformity, .. } =
             statistics;
-        let [a, b] = measured.grid.cell().map(|edge| edge / self.metre);
+        let [a, b] = measured.grid.cell().map(|edge| edge / self.metre());
         let inside = measured.values.iter().flatten().count() - points;
         let unit = self.quantity().unit();
         let error = if *mean > 0.0 { 100.0 * mean_error / mean } else { 0.0 };

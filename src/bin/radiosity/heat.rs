@@ -16,7 +16,7 @@ use radiosity::{Error, Scene, ViewFactors};
 use self::units::{SCALES, Scale, Temperature};
 use crate::args::{self, List, Stop, list, names, one_of};
 use crate::progress;
-use crate::scene_options::UNITS;
+use crate::scene_options::{UNITS, unit};
 use crate::view_factors::{MAX_PRINTED, ToError, enforce, print_checks};
 
 /// Solves the radiative heat balance of groups by their view factors
@@ -53,8 +53,8 @@ pub struct Options {
     /// required where one is below 150]
     #[arg(long, value_name = "SCALE", value_parser = one_of(SCALES))]
     temperatures: Option<Scale>,
-    /// Unit of length of the file, mm, cm, m, in or ft: gives powers in W, and areas in m²
-    #[arg(long, value_name = "UNIT", value_parser = one_of(UNITS))]
+    /// Unit of length of the file, mm, cm, m, in, ft or its metres: gives powers in W, and areas in m²
+    #[arg(long, value_name = "UNIT", value_parser = unit)]
     unit: Option<f64>,
     #[command(flatten)]
     factors: ToError,

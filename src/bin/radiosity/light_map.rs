@@ -21,7 +21,7 @@ use crate::args::{
 };
 use crate::bake::files::{self, SAMPLES, camera};
 use crate::scene_options::{Input, SceneOptions};
-use crate::viewer_options::ViewerOptions;
+use crate::viewer_options::{ViewerOptions, glb_settings};
 use crate::{interrupt, progress};
 
 /// Texels along a side where the error asked for says how many: the fewest and the most.
@@ -315,7 +315,7 @@ impl Options {
         }
         let tone = self.tone(baked)?;
         if writes(Format::Glb) {
-            let settings = self.viewer.glb(&tone, baked);
+            let settings = glb_settings(&tone, self.reading.unit, baked);
             let write = |path: &Path| write_light_map_glb(path, map, settings.clone());
             progress::of_writing(&path("glb"), write)?;
         }

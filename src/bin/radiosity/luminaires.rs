@@ -32,9 +32,6 @@ pub struct LuminaireOptions {
     #[arg(long, value_name = "N", value_parser = value::<usize>("a whole number from 1"))]
     #[arg(hide = true)]
     lamp_set: Option<usize>,
-    /// Metres in the scene's unit, for luminaires: 0.001 for millimetres
-    #[arg(long, value_name = "METRES", default_value = "1", value_parser = metres)]
-    metres_per_unit: f64,
 }
 
 /// A luminaire as an option names it.
@@ -58,12 +55,11 @@ pub struct Luminaires {
 }
 
 impl LuminaireOptions {
-    /// Reads the files of luminaires.
+    /// Reads the files of luminaires, for a scene whose unit is `metres_per_unit` long.
     ///
     /// # Errors
     /// Those of [`PhotometrySettings::read`]; [`ErrorKind`] `File` and `Setting` for lists.
-    pub fn read(&self) -> Result<Luminaires, Error> {
-        let metres_per_unit = self.metres_per_unit;
+    pub fn read(&self, metres_per_unit: f64) -> Result<Luminaires, Error> {
         let mut settings = PhotometrySettings::default();
         settings.lamp_set = self.lamp_set;
         let mut read = Luminaires { placed: vec![], files: vec![], settings, metres_per_unit };
@@ -215,10 +211,4 @@ fn luminaire(text: &str) -> Parsed<Given> {
     let (aim, c0) = (vectors.get(1).copied(), vectors.get(2).copied());
     let scale = args::rgb(scale).map_err(|_| wrong())?;
     Ok(Given { file: file.into(), position, aim, c0, scale })
-}
-
-fn metres(text: &str) -> Parsed<f64> {
-    let positive = |metres: &f64| metres.is_finite() && *metres > 0.0;
-    let metres = text.parse().ok().filter(positive);
-    metres.ok_or_else(|| give("metres, a number above 0, such as 0.001"))
 }

@@ -25,9 +25,16 @@ const SPECULAR: Names<SpecularSurfaces> = &[
     ("ignore", SpecularSurfaces::Ignore),
 ];
 
-/// Units of a scene's lengths, in metres.
+/// Units of length, in metres.
 pub const UNITS: Names<f64> =
     &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)];
+
+/// A unit of length in metres: by its name, or as a number of metres.
+pub fn unit(text: &str) -> Parsed<f64> {
+    let is_length = |metres: &f64| metres.is_finite() && *metres > 0.0;
+    let metres = one_of(UNITS)(text).ok().or_else(|| text.parse().ok().filter(is_length));
+    metres.ok_or_else(|| give("mm, cm, m, in, ft, or a number of metres above 0"))
+}
 
 /// How a scene is read, and what lights it.
 #[derive(Args)]
@@ -41,8 +48,12 @@ pub struct SceneOptions {
     /// repeated
     #[arg(long, value_name = "MATERIAL=r,g,b", value_parser = of_material)]
     emit: Vec<(String, Rgb)>,
+    /// Unit of the scene's lengths: mm, cm, m, in, ft or its metres. Luminaires, measuring grids and
+    /// glb files have metres
+    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = unit)]
+    pub unit: f64,
     /// Sides of faces that emit: front, or both as in Blender
-    #[arg(long, value_name = "SIDES", default_value = "front")]
+    #[arg(long, value_name = "SIDES", hide = true, default_value = "front")]
     #[arg(value_parser = one_of(EMIT_SIDES))]
     emit_sides: Sides,
     /// Share of the light on either side of this material that leaves diffusely from the other side
@@ -91,7 +102,7 @@ impl SceneOptions {
     /// [`Luminaires::over`].
     pub fn read(&self, path: &Path) -> Result<Input, Error> {
         let (scene, up, luminaires) = progress::of_reading(path, || {
-            let luminaires = self.luminaires.read()?;
+            let luminaires = self.luminaires.read(self.unit)?;
             let mut obj = ObjSettings::default();
             obj.strict = self.strict;
             obj.max_reflectance = self.max_reflectance;

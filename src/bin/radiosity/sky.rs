@@ -72,6 +72,12 @@ impl SkyOptions {
             || matches!(self.given_sun(), Some((SunPlace::At(..), _)))
     }
 
+    /// Whether it is the overcast sky, for which the daylight factor is defined (CIE S 011/E:2003,
+    /// types 1 and 16).
+    pub fn is_overcast(&self) -> bool {
+        matches!(self.kind, Some(Kind::Overcast | Kind::Cie(1)))
+    }
+
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
     pub fn is_default(&self) -> bool {
         self.kind.is_none() && self.given_sun().is_none()

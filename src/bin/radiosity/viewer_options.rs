@@ -5,17 +5,13 @@ use radiosity::camera::RadianceImage;
 use radiosity::io::{GlbSettings, ToneCurve};
 use radiosity::{BakeResult, Error, ErrorKind};
 
-use crate::args::{one_of, value};
-use crate::scene_options::UNITS;
+use crate::args::value;
 
 #[derive(Args)]
 pub struct ViewerOptions {
     /// Factor of radiance for the colours of png, glb and ply [default: chosen, and in the report]
     #[arg(long, value_name = "X", value_parser = value::<f64>("a number"))]
     exposure: Option<f64>,
-    /// Unit of the scene's lengths, for glb, which has metres: mm, cm, m, in or ft
-    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = one_of(UNITS))]
-    unit: f64,
 }
 
 impl ViewerOptions {
@@ -50,14 +46,15 @@ impl ViewerOptions {
             None => ToneCurve::fit(&baked.light.surface.radiosity),
         }
     }
+}
 
-    /// Settings of a GLB file of `baked`, in the colours of `tone`, a curve of radiosity.
-    pub fn glb(&self, tone: &ToneCurve, baked: &BakeResult) -> GlbSettings {
-        let mut settings = GlbSettings::from(tone);
-        settings.metres = self.unit;
-        settings.error = baked.estimate.total;
-        settings
-    }
+/// Settings of a GLB file of `baked`, whose unit of length is `metres`, in the colours of `tone`, a
+/// curve of radiosity.
+pub fn glb_settings(tone: &ToneCurve, metres: f64, baked: &BakeResult) -> GlbSettings {
+    let mut settings = GlbSettings::from(tone);
+    settings.metres = metres;
+    settings.error = baked.estimate.total;
+    settings
 }
 
 /// Whether a picture shows any light.

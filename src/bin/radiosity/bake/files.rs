@@ -15,7 +15,7 @@ use radiosity::{
 use crate::args::{self, List, Names, Output, Parsed, give, numbers, some_of};
 use crate::bake::bands;
 use crate::progress;
-use crate::viewer_options::{ViewerOptions, is_lit};
+use crate::viewer_options::{ViewerOptions, glb_settings, is_lit};
 
 /// Rays along a pixel's side.
 pub const SAMPLES: u32 = 4;
@@ -61,6 +61,9 @@ pub struct Files {
     camera: Option<Camera>,
     #[command(flatten)]
     viewer: ViewerOptions,
+    /// Metres in the scene's unit.
+    #[arg(skip = 1.0)]
+    pub metres: f64,
     /// Pixels of the picture
     #[arg(long, value_name = "W,H", default_value = "512,512")]
     #[arg(value_parser = numbers::<u32, 2>("2 whole numbers with a comma between them"))]
@@ -155,7 +158,7 @@ impl Files {
             })?;
         }
         if self.writes(Format::Glb) {
-            let settings = self.viewer.glb(tone, baked);
+            let settings = glb_settings(tone, self.metres, baked);
             let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
             progress::of_writing(&self.output.path("glb"), write)?;
         }
