@@ -147,9 +147,9 @@ impl MeasuringGrid {
 }
 
 impl MeasuredGrid {
-    /// Corrects the values, which are those of `light`, by paths until 95 % of them are estimated to
-    /// be off by less than the share `error`: see [`correct_by_paths`] for `progress` and `None`.
-    /// Standard errors are those against the true light then.
+    /// Corrects the values, which are those of `light`, by paths until 95 % of them are estimated
+    /// to be off by less than the share `error`: see [`correct_by_paths`] for `progress` and
+    /// `None`. Standard errors are those against the true light then.
     ///
     /// # Errors
     /// Those of [`correct_by_paths`].

@@ -21,9 +21,9 @@
 //!   missed = μ + w (D − μ),   w = τ²/(τ² + s²),    variance = w s² + (1 − w)² var(μ)
 //! ```
 //!
-//! for each channel, s² being the variance of D by the scatter of its paths. Where the light is good, τ is small and
-//! few paths do; where it is not, w goes to 1 and the value to that of the paths alone. Points
-//! whose error is too large get twice as many paths until it is not.
+//! for each channel, s² being the variance of D by the scatter of its paths. Where the light is
+//! good, τ is small and few paths do; where it is not, w goes to 1 and the value to that of the
+//! paths alone. Points whose error is too large get twice as many paths until it is not.
 
 mod shrinkage;
 
@@ -85,9 +85,9 @@ impl<const N: usize> NoisyValue<N> {
 }
 
 /// Corrects the irradiance `values` that `light` causes at `points`
-/// ([`irradiance_at`](crate::gather::irradiance_at)) by paths until 95 % of the values are estimated
-/// to be off by less than the share `error` of themselves: until their standard errors are half of
-/// that. These are standard errors against the true light of the scene then.
+/// ([`irradiance_at`](crate::gather::irradiance_at)) by paths until 95 % of the values are
+/// estimated to be off by less than the share `error` of themselves: until their standard errors
+/// are half of that. These are standard errors against the true light of the scene then.
 ///
 /// Points inside solids are left out. The same points give the same bits on any number of threads.
 /// `progress` is called with the number of paths done and of those that will be at least, several
@@ -144,22 +144,12 @@ pub(crate) fn correct<const N: usize>(
     let first = (FIRST_PATHS / values.len().max(1)).clamp(least, most);
     let (mut paths, mut done) = (first.next_power_of_two(), 0);
     let estimate = loop {
-        let to_do: usize = open.iter().map(|&k| paths - missed[k].paths).sum();
-        let all = done + to_do;
-        let (mut remaining, mut batches) = (&open[..], BatchSizer::new(16));
-        while !remaining.is_empty() {
-            let traced = batches.next(&mut remaining, |batch| {
-                let trace = |&k: &usize| (k, missed[k].more(paths, |path| sample(k, path)));
-                batch.par_iter().map(trace).collect::<Vec<_>>()
-            });
-            for (k, more) in traced {
-                done += more.paths - missed[k].paths;
-                missed[k] = more;
-            }
-            if progress(done, all).is_break() {
-                return Ok(None);
-            }
+        let all = done + open.iter().map(|&k| paths - missed[k].paths).sum::<usize>();
+        let report = |more: usize| progress(done + more, all);
+        if trace(&open, &mut missed, paths, &sample, report).is_break() {
+            return Ok(None);
         }
+        done = all;
         let estimate = Shrinkage::new(&missed);
         let is_open = |&k: &usize| {
             let variances = values[k].variance.iter().zip(estimate.variance(&missed[k]));
@@ -171,22 +161,55 @@ pub(crate) fn correct<const N: usize>(
         }
         paths *= 2;
     };
-    let mut squares = [0.0; 2];
-    for (value, missed) in values.iter_mut().zip(&missed) {
+    Ok(Some(PathCorrection {
+        common_error: estimate.common_variance()[0].map(f64::sqrt),
+        correction: add(&estimate, &missed, values),
+        paths: done,
+        is_reached: open.is_empty(),
+    }))
+}
+
+/// Adds what is missed, and its variance, to `values`; the root mean square of what is added over
+/// that of the values.
+fn add<const N: usize>(
+    estimate: &Shrinkage<N>,
+    missed: &[Missed<N>],
+    values: &mut [NoisyValue<N>],
+) -> f64 {
+    let (mut added, mut all) = (0.0, 0.0);
+    for (value, missed) in values.iter_mut().zip(missed) {
         let (correction, variance) = (estimate.missed(missed), estimate.variance(missed));
-        squares[0] += correction.iter().map(|c| c.length_squared()).sum::<f64>();
-        squares[1] += value.size().powi(2);
+        added += correction.iter().map(|c| c.length_squared()).sum::<f64>();
+        all += value.size().powi(2);
         for j in 0..N {
             value.value[j] += correction[j];
             value.variance[j] += variance[j];
         }
     }
-    Ok(Some(PathCorrection {
-        common_error: estimate.common_variance()[0].map(f64::sqrt),
-        correction: if squares[1] > 0.0 { (squares[0] / squares[1]).sqrt() } else { 0.0 },
-        paths: done,
-        is_reached: open.is_empty(),
-    }))
+    if all > 0.0 { (added / all).sqrt() } else { 0.0 }
+}
+
+/// Traces until the points `open` have `paths`. `progress` gets the number of those done.
+fn trace<const N: usize>(
+    open: &[usize],
+    missed: &mut [Missed<N>],
+    paths: usize,
+    sample: &(impl Fn(usize, usize) -> [Rgb; N] + Sync),
+    mut progress: impl FnMut(usize) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let (mut remaining, mut batches, mut done) = (open, BatchSizer::new(16), 0);
+    while !remaining.is_empty() {
+        let traced = batches.next(&mut remaining, |batch| {
+            let more = |&k: &usize| (k, missed[k].more(paths, |path| sample(k, path)));
+            batch.par_iter().map(more).collect::<Vec<_>>()
+        });
+        for (k, more) in traced {
+            done += more.paths - missed[k].paths;
+            missed[k] = more;
+        }
+        progress(done)?;
+    }
+    ControlFlow::Continue(())
 }
 
 /// Draws the variances of `values` half-way to their mean, relative to the values: each is that of

@@ -121,10 +121,10 @@ pub fn probes_at(
     Ok(Some(probes))
 }
 
-/// Corrects `probes`, made by [`probes_at`] of `light` with this `size`, by paths until 95 % of them
-/// are estimated to be off by less than the share `error`, root mean square over all normals, by
-/// harmonics to order 2: see [`path_correction`](crate::path_correction). Deviations are those from
-/// the true light then.
+/// Corrects `probes`, made by [`probes_at`] of `light` with this `size`, by paths until 95 % of
+/// them are estimated to be off by less than the share `error`, root mean square over all normals,
+/// by harmonics to order 2: see [`path_correction`](crate::path_correction). Deviations are those
+/// from the true light then.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] for a size or an `error` that is not above 0.

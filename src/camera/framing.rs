@@ -22,8 +22,8 @@ impl Camera {
     /// Chooses a view of what is lit in `light`, for a picture of this width over height: from
     /// inside where that is a room, from outside where it is an object or a room that lacks a wall.
     ///
-    /// Of four sides it is the one that most of the reflected light leaves to. [`Scene::up`](crate::Scene::up) is up.
-    /// The same light gives the same view.
+    /// Of four sides it is the one that most of the reflected light leaves to.
+    /// [`Scene::up`](crate::Scene::up) is up. The same light gives the same view.
     pub fn framing(light: &GatheredMesh, aspect: f64) -> Camera {
         let scene = light.mesh.scene();
         let (bounds, flux) = lit_box(light);

@@ -19,8 +19,8 @@ pub struct GridStatistics {
 }
 
 impl GridStatistics {
-    /// Of values with their standard errors, of which `common` is a part that all have alike; `None`
-    /// if there are none.
+    /// Of values with their standard errors, of which `common` is a part that all have alike;
+    /// `None` if there are none.
     pub fn of(values: impl Iterator<Item = [f64; 2]>, common: f64) -> Option<GridStatistics> {
         let (mut points, mut sum, mut squares) = (0, 0.0, 0.0);
         let (mut minimum, mut maximum) = (f64::INFINITY, f64::NEG_INFINITY);

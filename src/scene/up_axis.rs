@@ -10,7 +10,7 @@
 //! | groups and materials named floor, ceiling, ground are level | [`words`] | 4 |
 //! | those named wall are upright | [`words`] | 4 |
 //! | luminaires are at one height, below the top, and aimed down | [`luminaires`] | 3 |
-//! | area is level or upright, wider below than above, and faces up; lamps face down | [`geometry`] | 3 |
+//! | area is level or upright, wider below, and faces up; lamps face down | [`geometry`] | 3 |
 //! | prior: OBJ files are +y up by default in most programs | – | 0.2 |
 //!
 //! `docs/data/up_axis.tsv` has the evidence of each kind on scenes whose axis is known.

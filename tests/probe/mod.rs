@@ -45,8 +45,8 @@ fn furnace_has_constant_harmonics() {
     }
 }
 
-/// A cube whose walls emit 1 and reflect half, in light that lacks 0.3 of the reflected radiosity of
-/// 1 at one end and nothing at the other: by paths, irradiance is 2 whatever the normal, to the
+/// A cube whose walls emit 1 and reflect half, in light that lacks 0.3 of the reflected radiosity
+/// of 1 at one end and nothing at the other: by paths, irradiance is 2 whatever the normal, to the
 /// error that is stated.
 #[test]
 fn paths_correct_probes_in_light_that_is_wrong() {

@@ -53,7 +53,8 @@ pub struct Options {
     /// required where one is below 150]
     #[arg(long, value_name = "SCALE", value_parser = one_of(SCALES))]
     temperatures: Option<Scale>,
-    /// Unit of length of the file, mm, cm, m, in, ft or its metres: gives powers in W, and areas in m²
+    /// Unit of length of the file, mm, cm, m, in, ft or its metres: gives powers in W, and areas in
+    /// m²
     #[arg(long, value_name = "UNIT", value_parser = unit)]
     unit: Option<f64>,
     #[command(flatten)]

@@ -13,8 +13,8 @@
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
-//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 3 when results
-//! are written whose error is larger than what was asked for, 130 when Ctrl-C stopped it.
+//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 3 when
+//! results are written whose error is larger than what was asked for, 130 when Ctrl-C stopped it.
 
 /// Prints a line, also where nobody reads on, as behind `| head`: `println!` panics there.
 macro_rules! say {

@@ -48,8 +48,8 @@ pub struct SceneOptions {
     /// repeated
     #[arg(long, value_name = "MATERIAL=r,g,b", value_parser = of_material)]
     emit: Vec<(String, Rgb)>,
-    /// Unit of the scene's lengths: mm, cm, m, in, ft or its metres. Luminaires, measuring grids and
-    /// glb files have metres
+    /// Unit of the scene's lengths: mm, cm, m, in, ft or its metres. Luminaires, measuring grids
+    /// and glb files have metres
     #[arg(long, value_name = "UNIT", default_value = "m", value_parser = unit)]
     pub unit: f64,
     /// Sides of faces that emit: front, or both as in Blender

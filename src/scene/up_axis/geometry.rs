@@ -17,8 +17,8 @@ use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 /// Log-odds for each unit of difference, and the maximum: on scenes whose axis is known, 33 of 34
-/// differences above 0.1 were for the right one (`docs/data/up_axis.tsv`), and ln 33 is 3.5; 3, since
-/// some of them are scenes of one maker.
+/// differences above 0.1 were for the right one (`docs/data/up_axis.tsv`), and ln 33 is 3.5; 3,
+/// since some of them are scenes of one maker.
 const SLOPE: f64 = 12.0;
 const MAXIMUM: f64 = 3.0;
 

@@ -74,8 +74,8 @@ impl<'a> LampBacks<'a> {
 }
 
 /// A random walk from a point on the dark side of a lamp until it meets such a side again: 1 if it
-/// leaves the scene after it met a surface, 0 if it met one farther away than the lamp is wide, none
-/// otherwise.
+/// leaves the scene after it met a surface, 0 if it met one farther away than the lamp is wide,
+/// none otherwise.
 fn walk(
     walks: &Walks,
     start: (DVec3, SideIndex),

@@ -63,7 +63,7 @@ pub struct Files {
     viewer: ViewerOptions,
     /// Metres in the scene's unit.
     #[arg(skip = 1.0)]
-    pub metres: f64,
+    metres: f64,
     /// Pixels of the picture
     #[arg(long, value_name = "W,H", default_value = "512,512")]
     #[arg(value_parser = numbers::<u32, 2>("2 whole numbers with a comma between them"))]
@@ -86,8 +86,9 @@ pub struct Picture {
 
 impl Files {
     /// Names the files after the scene, where they are given no name, and checks whether all of it
-    /// can be written, before any work is done for it.
-    pub fn name_after(&mut self, scene: &Path) -> Result<(), Error> {
+    /// can be written, before any work is done for it. `metres` are those of the scene's unit.
+    pub fn name_after(&mut self, scene: &Path, metres: f64) -> Result<(), Error> {
+        self.metres = metres;
         self.output.name(scene.with_extension(""), &args::names(FORMATS))?;
         self.viewer.check()?;
         let [width, height] = self.image;
