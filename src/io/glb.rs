@@ -62,7 +62,7 @@ use two_sides::TwoSides;
 /// median light.
 ///
 /// Lengths and axes of vertices are those of the scene, and the top node turns them to +Y up and
-/// scales them to metres, as glTF has them ([`Scene::up`], [`GlbSettings`]).
+/// scales them to metres, as glTF has them ([`Scene::up`](crate::Scene::up), [`GlbSettings`]).
 /// A scene more than 16 of its sizes
 /// from the origin is moved there, and that node moves it back.
 ///
