@@ -25,9 +25,9 @@ pub fn section() -> Result<Section> {
     for rho in [0.05, 0.2, 0.5, 0.8, 0.95] {
         cases.push(room(rho)?);
     }
-    let bands = "5.6, 5.7: the edge of what is seen crosses at most 4.5 √N of the strata of N = 2¹⁸ \
-        rays, each right or wrong by half: four standard deviations are 4.2 N^(−3/4) of all the \
-        hemisphere, 0.036 %. 5.8: the 2 % that the bake is asked for.";
+    let bands = "5.6, 5.7: the edge of what is seen crosses at most 4.5 √N of the strata of N = \
+        2¹⁸ rays, each right or wrong by half: four standard deviations are 4.2 N^(−3/4) of \
+        all the hemisphere, 0.036 %. 5.8: the 2 % that the bake is asked for.";
     Ok(Section { title: "CIE 171:2006", bands, cases })
 }
 
@@ -72,7 +72,7 @@ impl Row {
             let sample: &radiosity::gather::IrradianceSample = sample;
             Case {
                 name: format!("{}, point {name}", self.case),
-                source: "CIE 171:2006, tables 17 and 19, and its closed form".into(),
+                source: "closed form; tables 17 and 19 (errata 2016) to their digits".into(),
                 quantity: "E/(E ρ of the surface), %".into(),
                 right: 100.0 * point_to_polygon(point, normal, &seen(point).map(DVec3::from_array)),
                 here: 100.0 * (sample.irradiance - sample.direct).x,
@@ -149,7 +149,7 @@ fn room(rho: f64) -> Result<Case> {
     let right = FLUX / (AREA * (1.0 - rho));
     Ok(Case {
         name: format!("5.8 light in a cube, ρ = {rho}"),
-        source: "CIE 171:2006, table 20, and its closed form, Φ/(A (1 − ρ))".into(),
+        source: "closed form, Φ/(A (1 − ρ)); table 20 is ρ times that".into(),
         quantity: "mean illuminance, lx".into(),
         right,
         here: furnace::mean(&baked.light.surface) / rho,

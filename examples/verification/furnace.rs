@@ -30,8 +30,9 @@ pub fn section() -> Result<Section> {
         cases.push(path_traced(rho));
     }
     let bands = "Solver: the unshot share u of the emitted flux leaves ρ u of the radiosity out, \
-        nearly all of which it is where the solver stops, and sums round to 1e-9. Bakes: the mean is no further off than the root mean square, which is \
-        the 1 % asked for. Path tracer: four standard errors.";
+        nearly all of which it is where the solver stops, and sums round to 1e-9. Bakes: \
+        the mean is no further off than the root mean square, which is the 1 % asked for. \
+        Path tracer: four standard errors.";
     Ok(Section { title: "Furnaces", bands, cases })
 }
 

@@ -30,11 +30,11 @@ pub fn section() -> Result<Section> {
     cases.push(body_in_a_room()?);
     cases.push(fin()?);
     cases.extend(flux_at_points()?);
-    let bands = "Shields: 4e-6 of the hot plate's emission for each gap, which leaves at the edges of \
-        plates 10⁶ times as wide as a gap. Cavity, cube and fin: factors are closed forms, exact to \
-        1e-12 of the area, and emissivities amplify it less than 100 times. Spheres: four standard \
-        errors, as stated. Body in a room: the error of factors that is asked for, 1e-5. Points: \
-        rounding of the closed form.";
+    let bands = "Shields: 4e-6 of the hot plate's emission for each gap, which leaves at the edges \
+        of plates 10⁶ times as wide as a gap. Cavity, cube and fin: factors are closed \
+        forms, exact to 1e-12 of the area, and emissivities amplify it less than 100 \
+        times. Spheres: four standard errors, as stated. Body in a room: the error of \
+        factors that is asked for, 1e-5. Points: rounding of the closed form.";
     Ok(Section { title: "Heat exchange", bands, cases })
 }
 

@@ -16,9 +16,10 @@ const STEP: f64 = PI / 36.0;
 pub fn section() -> Result<Section> {
     let mut cases = fluxes()?;
     cases.extend(under_a_downlight()?);
-    let bands = "Flux of cos³ and cos: linear interpolation over h = 5° is off by h²/8 of the second \
-        derivative, at most 3 and 1 times the peak: 3h²/2 and h²/4 of the flux. Direct and indirect: \
-        digits of the file, 5e-5 of 83.545 cd, and rounding. Points: digits of the file.";
+    let bands = "Flux of cos³ and cos: linear interpolation over h = 5° is off by h²/8 of the \
+        second derivative, at most 3 and 1 times the peak: 3h²/2 and h²/4 of the flux. \
+        Direct and indirect: digits of the file, 5e-5 of 83.545 cd, and rounding. Points: \
+        digits of the file.";
     Ok(Section { title: "Luminaires", bands, cases })
 }
 

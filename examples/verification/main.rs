@@ -25,7 +25,6 @@ mod program {
 #[allow(dead_code, reason = "a part of it is used")]
 #[path = "../../tests/common/scenes.rs"]
 mod scenes;
-#[allow(dead_code, reason = "a part of it is used")]
 #[path = "../../tests/common/truth.rs"]
 mod truth;
 

@@ -60,9 +60,9 @@ pub fn section() -> Result<Section> {
         cases.extend(traced.points(surface, &text)?);
     }
     let bands = "All points: the 2 % or 5 % that the bake is asked for, which is the root mean \
-        square over 99 % of the area. Single points, every tenth: twice the error that the bake \
-        states there, which is two standard errors, and four times the noise of the truth, 0.1 % in \
-        the Cornell box and 0.3 % in the others.";
+        square over 99 % of the area. Single points, every tenth: twice the error that the \
+        bake states there, which is two standard errors, and four times the noise of the \
+        truth, 0.1 % in the Cornell box and 0.3 % in the others.";
     Ok(Section { title: "Path-traced scenes", bands, cases })
 }
 

@@ -28,7 +28,8 @@ pub fn png(sections: &[Section]) -> Result<Vec<u8>, String> {
     canvas::png((size.0 as u32, size.1 as u32), |canvas| {
         let title = "Cases with known answers: deviation over allowed band";
         canvas.text(title, (56.0, 28.0), Font::new(24.0, BLACK).bold())?;
-        let line = "A dot for each case, numbered as in verification.md; green is the band, red is outside it.";
+        let line =
+            "A dot for each case, as numbered in verification.md; green: the band, red: outside.";
         canvas.text(line, (56.0, 60.0), Font::new(16.0, GREY))?;
         for (k, section) in sections.iter().enumerate() {
             let (column, row) = ((k % COLUMNS) as f64, (k / COLUMNS) as f64);

@@ -6,15 +6,17 @@ use crate::case::{Case, Section};
 
 const HEAD: &str = "# Verification
 
-Cases with known answers: closed forms, published values and path-traced values, and what the crate computes. Written by
+Cases with known answers, closed forms, published values and path-traced values, and what the crate
+computes. Written by
 
 ```sh
 cargo run --release --features cli --example verification
 ```
 
-which fails if a case is outside its band; CI runs it. Adapter: none, rays on the CPU (`Backend::Cpu`). Deviation is
-(here − right)/right; where the right value is 0, here − right. The band is the largest |here − right| allowed, and
-follows from what the sentence under each title says. FAILED marks cases outside it.
+which fails if a case is outside its band; CI runs it. Adapter: none, rays on the CPU
+(`Backend::Cpu`). Deviation is (here − right)/right; where the right value is 0, here − right. The
+band is the largest |here − right| allowed, and follows from what stands under each title. FAILED
+marks cases outside it.
 
 ![Deviation over band, a dot for each case](verification.png)
 ";

@@ -45,10 +45,10 @@ pub fn section() -> Result<Section> {
     }
     cases.extend(luminances()?);
     let bands = "Uniform sky and sun: rounding. Overcast sky: its pieces of 0.3° and N = 2¹⁴ rays \
-        take second differences of what changes by all of itself over 90°, below 1e-4; on the wall \
-        the horizon runs between rays, π √N of which are at it: 1/128. CIE and Perez: a corner of a \
-        piece is 0.21° from its middle, and the radiance changes by less than twice itself over a \
-        radian: 0.74 %.";
+        take second differences of what changes by all of itself over 90°, below 1e-4; on \
+        the wall the horizon runs between rays, π √N of which are at it: 1/128. CIE and \
+        Perez: a corner of a piece is 0.21° from its middle, and the radiance changes by \
+        less than twice itself over a radian: 0.74 %.";
     Ok(Section { title: "Sky and sun", bands, cases })
 }
 

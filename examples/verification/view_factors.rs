@@ -39,10 +39,11 @@ pub fn section() -> Result<Section> {
     }
     cases.extend(concentric_spheres()?);
     let bands = "Four standard errors, as stated, but no more than the error that is asked for \
-        (1e-4; 1e-2 for the listed concentric spheres), rounding of contour integrals (1e-12), and \
-        what is known of the truth. Points: rounding of the closed form. Right values are those of \
-        tests/data/view_factors/expected.json: closed forms, contour integrals and exact shadows of \
-        the polygons as given, to 40 digits where there is no shadow; sources name the geometry.";
+        (1e-4; 1e-2 for the listed concentric spheres), rounding of contour integrals \
+        (1e-12), and what is known of the truth. Points: rounding of the closed form. \
+        Right values are those of tests/data/view_factors/expected.json: closed forms, \
+        contour integrals and exact shadows of the polygons as given, to 40 digits where \
+        there is no shadow; sources name the geometry.";
     Ok(Section { title: "View factors", bands, cases })
 }
 
