@@ -4,14 +4,12 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-use glam::DVec3;
-use radiosity::gather::{GatherPoint, RadiosityField};
 use radiosity::heat::{Boundary, HeatBalance, HeatSettings, STEFAN_BOLTZMANN, Surface};
-use radiosity::{Backend, Mesh, Rgb, Scene, ViewFactors, load_obj};
+use radiosity::{Scene, ViewFactors, load_obj};
 
 use crate::case::{Case, Section};
-use crate::scenes::{Quad, block, cube, facing_down, facing_up, grey, lamp, quads, walls};
-use crate::{Result, file, go_on, view_factors};
+use crate::scenes::{Quad, block, cube, facing_down, facing_up, grey, quads, walls};
+use crate::{Result, file, go_on, points, view_factors};
 
 /// Plates of the shields, K.
 const HOT: f64 = 773.15;
@@ -29,7 +27,7 @@ pub fn section() -> Result<Section> {
     cases.push(concentric_spheres()?);
     cases.push(body_in_a_room()?);
     cases.push(fin()?);
-    cases.extend(flux_at_points()?);
+    cases.extend(points::flux_from_a_square(black(1273.15))?);
     let bands = "Shields: 4e-6 of the hot plate's emission for each gap, which leaves at the edges \
         of plates 10⁶ times as wide as a gap. Cavity, cube and fin: factors are closed \
         forms, exact to 1e-12 of the area, and emissivities amplify it less than 100 \
@@ -235,53 +233,4 @@ fn fin() -> Result<Case> {
         here: temperature(&found, 1)?,
         band: 1e-10 * right,
     })
-}
-
-/// F from a point to a parallel rectangle a × b at the distance c, one corner of which is opposite
-/// (Howell B-3).
-fn to_corner(a: f64, b: f64, c: f64) -> f64 {
-    let (x, y) = (a / c, b / c);
-    let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
-    (x / p * (y / p).atan() + y / q * (x / q).atan()) / (2.0 * PI)
-}
-
-/// What a black square of 2 × 2 at 1273.15 K sends to points before its middle and its corner.
-fn flux_at_points() -> Result<Vec<Case>> {
-    let emission = black(1273.15);
-    let mut cases = vec![];
-    for distance in [1.0, 2.0, 5.0] {
-        let plate = facing_down([-1.0, 1.0], [-1.0, 1.0], distance);
-        let scene = quads(&[
-            (plate, lamp([emission; 3])),
-            (facing_up([9.0, 10.0], [0.0, 1.0], 0.0), lamp([0.0; 3])),
-        ]);
-        let places = [
-            ("middle", DVec3::ZERO, 4.0 * to_corner(1.0, 1.0, distance)),
-            ("corner", DVec3::new(1.0, 1.0, 0.0), to_corner(2.0, 2.0, distance)),
-        ];
-        for (place, position, factor) in places {
-            cases.push(Case {
-                name: format!(
-                    "point {distance} m before the {place} of a square of 2 m at 1000 °C"
-                ),
-                source:
-                    "closed form, Howell B-3; as FDS plate_view_factor, radiating_polygon_square"
-                        .into(),
-                quantity: "heat flux, W/m²".into(),
-                right: emission * factor,
-                here: irradiance(&scene, position)?,
-                band: 1e-12 * emission * factor,
-            });
-        }
-    }
-    Ok(cases)
-}
-
-/// Irradiance at a point that looks up.
-pub fn irradiance(scene: &Scene, position: DVec3) -> Result<f64> {
-    let mesh = Mesh::new(scene.clone(), f64::INFINITY)?;
-    let corners = vec![[0; 3]; mesh.element_count()];
-    let field = RadiosityField { mesh: &mesh, corners: &corners, reflected: &[Rgb::ZERO] };
-    let point = GatherPoint { position, normal: DVec3::Z, near: 1e-7 };
-    Ok(Backend::Cpu.gather(&mesh, 1 << 14)?.gather(&field, &[point])?[0].irradiance.x)
 }

@@ -8,7 +8,7 @@ use radiosity::scene::Luminaire;
 
 use crate::case::{Case, Section};
 use crate::scenes::{facing_up, paint, quads};
-use crate::{Result, file, heat};
+use crate::{Result, file, points};
 
 /// Angles between the values of the files, radians.
 const STEP: f64 = PI / 36.0;
@@ -68,7 +68,7 @@ fn under_a_downlight() -> Result<Vec<Case>> {
             source: "closed form, I cos θ / r²".into(),
             quantity: "illuminance, lx".into(),
             right,
-            here: heat::irradiance(&scene, 2.0 * tangent * DVec3::X)?,
+            here: points::irradiance(&scene, 2.0 * tangent * DVec3::X)?,
             band: (5e-5 / intensity + 1e-12) * right,
         });
     }

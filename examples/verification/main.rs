@@ -13,6 +13,7 @@ mod heat;
 mod luminaires;
 mod path_traced;
 mod plot;
+mod points;
 mod report;
 mod sky;
 mod view_factors;

@@ -8,7 +8,7 @@ use radiosity::{Rgb, Sky, Sun};
 
 use crate::case::{Case, Section};
 use crate::scenes::{facing_up, paint, quads};
-use crate::{Result, heat};
+use crate::{Result, points};
 
 /// Of the radiance, from the middle of a piece of the sky to its corner: 0.3°/√2, and its logarithm
 /// changes by less than 2 a radian in all directions that are looked at here (1.9 at most, measured
@@ -61,7 +61,7 @@ fn under(name: &str, source: &str, sky: &Sky, [right, share]: [f64; 2]) -> Resul
         source: source.into(),
         quantity: "irradiance, W/m²".into(),
         right,
-        here: heat::irradiance(&scene, DVec3::ZERO)?,
+        here: points::irradiance(&scene, DVec3::ZERO)?,
         band: share * right,
     })
 }
