@@ -15,6 +15,7 @@
 //! [measured](MeasuringGrid::measure) in the light of a bake. Strip and spacing are those of EN
 //! 12464-1 unless [`GridSettings`] say otherwise.
 
+mod floor;
 mod measuring_grid;
 mod plane;
 mod quantity;
@@ -31,6 +32,8 @@ use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, PointIrradiance, irradiance_at};
 use crate::path_correction::{PathCorrection, correct_by_paths};
 use crate::scene::{Rgb, Scene};
+use crate::visibility::ray_scene::RayScene;
+use floor::Floor;
 pub use measuring_grid::MeasuringGrid;
 pub use plane::GridPlane;
 pub use quantity::Quantity;
@@ -82,10 +85,12 @@ impl MeasuringGrid {
         settings: &GridSettings,
     ) -> Result<Vec<MeasuringGrid>, Error> {
         let metre = settings.checked()?.metre;
-        let floors = LevelSurface::floors(scene, up.normalize_or_zero(), metre);
+        let rays = RayScene::of_scene(scene);
+        let surfaces = LevelSurface::floors(scene, up.normalize_or_zero(), metre).into_iter();
+        let floors = surfaces.map(|surface| Floor::new(surface, scene, &rays, metre)).collect();
         let mut grids = vec![];
-        for floor in LevelSurface::without_roofs(floors, scene, metre) {
-            grids.extend(floor.grids_of_rooms(scene, height * metre, settings)?);
+        for floor in Floor::without_roofs(floors) {
+            grids.extend(floor.grids(scene, height * metre, settings)?);
         }
         Ok(grids)
     }

@@ -41,8 +41,8 @@ pub(super) struct FloorRaster<'a> {
     free: Vec<Option<f64>>,
     /// The number of each cell's room.
     rooms: Vec<Option<usize>>,
-    /// Area of each room, scene unit squared, the first cell's first.
-    areas: Vec<f64>,
+    /// Number of rooms.
+    room_count: usize,
 }
 
 impl<'a> FloorRaster<'a> {
@@ -69,7 +69,7 @@ impl<'a> FloorRaster<'a> {
             counts,
             free: vec![],
             rooms: vec![],
-            areas: vec![],
+            room_count: 0,
         };
         let free = |k: usize| {
             Some(raster.middle(k)).filter(|&p| is_floor(p)).and_then(|p| raster.free_above(p))
@@ -135,8 +135,8 @@ impl<'a> FloorRaster<'a> {
             let root = joined.find(k);
             if area[root] >= MIN_AREA * self.metre * self.metre {
                 let number = *numbers[root].get_or_insert_with(|| {
-                    self.areas.push(area[root]);
-                    self.areas.len() - 1
+                    self.room_count += 1;
+                    self.room_count - 1
                 });
                 self.rooms[k] = Some(number);
             }
@@ -145,7 +145,7 @@ impl<'a> FloorRaster<'a> {
 
     /// Number of rooms.
     pub fn room_count(&self) -> usize {
-        self.areas.len()
+        self.room_count
     }
 
     /// The room of point `p` of the floor: that of the nearest cell without a wall between.
@@ -170,8 +170,12 @@ impl<'a> FloorRaster<'a> {
         visible.min_by(|a, b| a.0.total_cmp(&b.0)).and_then(|(_, k)| self.rooms[k])
     }
 
-    /// The part of the rectangle around `room`: as far as walls and the floor reach from its cells.
+    /// The part of the rectangle around `room`: as far as walls and the floor reach from its cells;
+    /// all of it where there is no other.
     pub fn rectangle(&self, room: usize) -> GridPlane {
+        if self.room_count == 1 {
+            return self.plane;
+        }
         let (mut low, mut high) = (DVec2::ONE, DVec2::ZERO);
         for k in (0..self.rooms.len()).filter(|&k| self.rooms[k] == Some(room)) {
             let at =

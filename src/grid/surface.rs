@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::measuring_grid::MeasuringGrid;
 use super::plane::GridPlane;
-use super::rooms::{FloorRaster, MIN_AREA};
+use super::rooms::MIN_AREA;
 use super::settings::GridSettings;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::geometry::rectangle::Rectangle;
@@ -19,10 +19,10 @@ const LEVEL_COSINE: f64 = 0.996;
 
 /// Triangles with similar normals, in about one plane.
 pub(super) struct LevelSurface {
-    name: String,
+    pub name: String,
     triangles: Vec<usize>,
     /// Unit length.
-    normal: DVec3,
+    pub normal: DVec3,
     /// Height of the highest corner along the normal, scene unit.
     level: f64,
 }
@@ -125,7 +125,7 @@ impl LevelSurface {
 
     /// The grid in `plane` less the strip, of points from which all around, as far as the strip is
     /// wide, `has` is true. None if no point is left.
-    fn filled(
+    pub fn filled(
         &self,
         name: String,
         plane: GridPlane,
@@ -144,56 +144,6 @@ impl LevelSurface {
         Ok(grid.points.iter().any(Option::is_some).then_some(grid))
     }
 
-    /// The grids `height` above each of its rooms, scene unit; numbered where there are several.
-    pub fn grids_of_rooms(
-        &self,
-        scene: &Scene,
-        height: f64,
-        settings: &GridSettings,
-    ) -> Result<Vec<MeasuringGrid>, Error> {
-        let Some(plane) = self.plane(scene, 0.0) else { return Ok(vec![]) };
-        let rays = RayScene::of_scene(scene);
-        let footprint = Footprint::new(self, scene);
-        let raster = FloorRaster::new(&rays, plane, settings.metre, |p| footprint.has(p));
-        let Some(raster) = raster else {
-            return Ok(self.grid(scene, height, settings)?.into_iter().collect());
-        };
-        let lift = self.normal * height;
-        let mut grids = vec![];
-        for room in 0..raster.room_count() {
-            let name = match raster.room_count() {
-                1 => self.name.clone(),
-                _ => format!("{} {}", self.name, room + 1),
-            };
-            let plane = if raster.room_count() == 1 { plane } else { raster.rectangle(room) };
-            let plane = GridPlane { origin: plane.origin + lift, ..plane };
-            let is_in_room = |p: DVec3| footprint.has(p) && raster.room_at(p - lift) == Some(room);
-            grids.extend(self.filled(name, plane, settings, is_in_room)?);
-        }
-        Ok(grids)
-    }
-
-    /// Those of `floors` that are no roofs; all where there would be none.
-    pub fn without_roofs(
-        floors: Vec<LevelSurface>,
-        scene: &Scene,
-        metre: f64,
-    ) -> Vec<LevelSurface> {
-        let footprints: Vec<Footprint> =
-            floors.iter().map(|floor| Footprint::new(floor, scene)).collect();
-        let rays = RayScene::of_scene(scene);
-        let is_roof = |k: usize| {
-            let Some(plane) = floors[k].plane(scene, 0.0) else { return false };
-            let raster = FloorRaster::new(&rays, plane, metre, |p| footprints[k].has(p));
-            let is_below = |p: DVec3| footprints[..k].iter().any(|below| below.has(p));
-            raster.is_some_and(|raster| raster.is_roof(is_below))
-        };
-        let roofs: Vec<bool> = (0..floors.len()).map(is_roof).collect();
-        let has_floor = roofs.contains(&false);
-        let kept = floors.into_iter().zip(roofs).filter(|(_, is_roof)| !(*is_roof && has_floor));
-        kept.map(|(floor, _)| floor).collect()
-    }
-
     /// Unit vectors along the first edge of `plane`, and across it.
     fn axes(&self, plane: &GridPlane) -> [DVec3; 2] {
         let along = plane.edges[0].normalize_or_zero();
@@ -202,7 +152,7 @@ impl LevelSurface {
 
     /// The smallest rectangle around it, `height` above: its longer edge is the first, in the
     /// positive direction of an axis of the scene.
-    fn plane(&self, scene: &Scene, height: f64) -> Option<GridPlane> {
+    pub fn plane(&self, scene: &Scene, height: f64) -> Option<GridPlane> {
         let (x, y) = self.normal.any_orthonormal_pair();
         let corners = self.triangles.iter().flat_map(|&t| scene.corners(t));
         let flat: Vec<DVec2> = corners.map(|p| DVec2::new(p.dot(x), p.dot(y))).collect();
@@ -226,7 +176,7 @@ impl LevelSurface {
 }
 
 /// Where a level surface is, from above.
-struct Footprint {
+pub(super) struct Footprint {
     triangles: RayScene,
     normal: DVec3,
     /// A distance beyond all of the scene.
@@ -234,14 +184,14 @@ struct Footprint {
 }
 
 impl Footprint {
-    fn new(surface: &LevelSurface, scene: &Scene) -> Footprint {
+    pub fn new(surface: &LevelSurface, scene: &Scene) -> Footprint {
         let triangles = RayScene::new(surface.triangles.iter().map(|&t| scene.corners(t)));
         let size = 2.0 * scene.bounds().longest_side();
         Footprint { triangles, normal: surface.normal, size }
     }
 
     /// Whether it is above or below `p`.
-    fn has(&self, p: DVec3) -> bool {
+    pub fn has(&self, p: DVec3) -> bool {
         let (above, reach) = (p + self.normal * self.size, 0.0..2.0 * self.size);
         self.triangles.occluded(above, -self.normal, reach, |_| true)
     }

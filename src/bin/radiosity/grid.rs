@@ -133,23 +133,26 @@ impl Options {
     fn measure(&self, grids: &[Placed], light: &Light) -> Result<Option<Vec<MeasuredGrid>>, Error> {
         let lit = &light.baked.light;
         progress::of_stoppable("points", |report| {
-            let mut all = vec![];
-            for (_, grid) in grids {
-                // With more rays where gathering alone would take most of the error.
-                for noise in [0.25, 0.125, 0.0625, 0.03125].map(|share| share * self.light.error())
-                {
-                    let mut gatherer = light.device.gather_to_noise(lit, noise.min(1.0))?;
-                    let Some(measured) = grid.measure(lit, &mut *gatherer, &mut *report)? else {
-                        return Ok(None);
-                    };
-                    let is_enough = measured.relative_error() < 0.25 * self.light.error();
-                    if is_enough || noise < 0.04 * self.light.error() {
-                        all.push(measured);
-                        break;
-                    }
+            let mut all: Vec<Option<MeasuredGrid>> = vec![None; grids.len()];
+            // With more rays where gathering alone would take most of the error.
+            for share in [0.25, 0.125, 0.0625, 0.03125] {
+                let is_noisy = |measured: &MeasuredGrid| {
+                    measured.relative_error() >= 0.25 * self.light.error()
+                };
+                let open: Vec<usize> =
+                    (0..grids.len()).filter(|&k| all[k].as_ref().is_none_or(is_noisy)).collect();
+                if open.is_empty() {
+                    break;
+                }
+                let noise = (share * self.light.error()).min(1.0);
+                let mut gatherer = light.device.gather_to_noise(lit, noise)?;
+                for k in open {
+                    let measured = grids[k].1.measure(lit, &mut *gatherer, &mut *report)?;
+                    let Some(measured) = measured else { return Ok(None) };
+                    all[k] = Some(measured);
                 }
             }
-            Ok(Some(all))
+            Ok(Some(all.into_iter().flatten().collect()))
         })
     }
 
@@ -174,8 +177,8 @@ impl Options {
     fn outdoors(&self, scene: &Scene) -> Option<f64> {
         let is_alone = !scene.has_emitter() && scene.luminaires().is_empty();
         let is_overcast = self.light.reading.sky.is_overcast() && scene.sky().sun().is_none();
-        let irradiance = self.quantity().of(scene.sky().irradiance(scene.up()));
-        (is_alone && is_overcast && irradiance > 0.0).then_some(irradiance)
+        let irradiance = || self.quantity().of(scene.sky().irradiance(scene.up()));
+        (is_alone && is_overcast).then(irradiance).filter(|&irradiance| irradiance > 0.0)
     }
 
     fn write(

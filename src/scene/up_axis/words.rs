@@ -10,7 +10,6 @@ use crate::scene::Scene;
 /// Spanish, Italian.
 const LEVEL: &[&str] = &[
     "floor",
-    "ceiling",
     "ceil",
     "ground",
     "terrain",
@@ -33,8 +32,8 @@ const LEVEL: &[&str] = &[
 /// The same of upright ones.
 const UPRIGHT: &[&str] = &["wall", "wand", "mauer", "pared", "parete", "facade", "fassade"];
 
-/// Programs by a word of their comments, and the axis that their OBJ files have up by default: +1
-/// for z, −1 for y. Blender, 3ds Max and SketchUp ask, and propose y.
+/// Programs by words of their comments, and log-odds for the axis that their OBJ files have up by
+/// default. Blender, 3ds Max and SketchUp ask, and propose y. Plain choice.
 const PROGRAMS: &[(&str, f64)] = &[
     ("blender", -0.7),
     ("3ds max", -0.7),
