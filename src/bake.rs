@@ -39,7 +39,7 @@ pub(crate) mod model;
 mod outcome;
 mod pipeline;
 mod progress;
-mod received_points;
+mod received_light;
 mod result;
 mod settings;
 mod shooting_phase;

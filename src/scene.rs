@@ -266,6 +266,11 @@ impl Scene {
         0.5 * (b - a).cross(c - a).length()
     }
 
+    /// Area of all triangles, scene unit squared.
+    pub(crate) fn total_area(&self) -> f64 {
+        (0..self.triangles.len()).map(|t| self.area(t)).sum()
+    }
+
     /// Whether the whole back of triangle `t` coincides with fronts of others: no ray hits it, and
     /// rays from that side hit those fronts.
     pub(crate) fn is_back_covered(&self, t: usize) -> bool {

@@ -87,6 +87,12 @@ pub struct Progress {
     pub elapsed: Duration,
 }
 
+impl Progress {
+    /// Before the first step.
+    pub(crate) const NOTHING_SHOT: Progress =
+        Progress { steps: 0, shots: 0, rows_made: 0, unshot_share: 1.0, elapsed: Duration::ZERO };
+}
+
 impl Solution {
     /// Σ weight × solution: combines lights that were solved separately on the same mesh. Weights
     /// are per channel and ≥ 0. Radiosity and ledger are linear in the emission. Steps, shots and

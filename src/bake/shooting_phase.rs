@@ -16,11 +16,10 @@ use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
 use crate::bake::estimator::{self, ErrorEstimator, EstimatedError};
 use crate::bake::fallback::{ResilientBackend, ResilientRows};
-use crate::bake::light_survey;
 use crate::bake::model;
 use crate::bake::outcome::{Obstacle, Outcome};
 use crate::bake::progress::{BakeProgress, Reporter, StageClock};
-use crate::bake::received_points::received_points;
+use crate::bake::received_light::received;
 use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, SolveSettings};
 use crate::bake::strata::SampleCounts;
@@ -28,12 +27,10 @@ use crate::bake::validator::{self, Validator};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
-use crate::gather::GatherPoint;
 use crate::gather::GatheredMesh;
-use crate::gather::gather_points::SurfaceOffset;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
-use crate::scene::{Rgb, Scene};
+use crate::scene::Scene;
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 use crate::verify::octaves_of;
 
@@ -63,7 +60,9 @@ pub(super) fn shoot(
     let mut rows = ProximityCorrection::new(rows, &mesh, settings.near_reach);
     clock.timings.mesh = clock.lap();
     let mut progress = |p: &Progress| reporter.report(BakeProgress::Shooting(*p));
-    let received = received(settings, &mesh, backend)?;
+    let nothing_shot = Progress::NOTHING_SHOT;
+    let mut proceed = || progress(&nothing_shot);
+    let received = received(&mesh, &settings.gathered_materials, backend, &mut proceed)?;
     let mut solution = solve(settings, &mesh, &received, &mut rows, &mut progress)?;
     if settings.ambient {
         solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
@@ -107,41 +106,6 @@ fn solve(
             session.into_solution()
         }
     }
-}
-
-/// What the elements of `mesh` receive of the lights that are gathered, and of sky and luminaires.
-fn received(
-    settings: &SolveSettings,
-    mesh: &Mesh,
-    backend: &ResilientBackend,
-) -> Result<ReceivedLight, Error> {
-    let materials = &settings.gathered_materials;
-    if materials.is_empty() && !mesh.scene().has_light_of_no_surface() {
-        return Ok(ReceivedLight::default());
-    }
-    let scene = mesh.scene();
-    let mut lit = scene.materials().to_vec();
-    for (_, material) in (0..).zip(&mut lit).filter(|(m, _)| !materials.contains(m)) {
-        material.exitance = Rgb::ZERO;
-    }
-    let mesh = &mesh.with_scene(scene.with_materials(lit)?)?;
-    let above = SurfaceOffset::new(mesh.scene());
-    let elements = 0..mesh.element_count();
-    let reflecting: Vec<usize> = elements.filter(|&e| mesh.scatters(mesh.element(e))).collect();
-    let points: Vec<Vec<GatherPoint>> =
-        reflecting.iter().map(|&e| received_points(&above, mesh, mesh.element(e))).collect();
-    let corners = vec![[0; 3]; mesh.element_count()];
-    let all_points = points.concat();
-    let rays = model::received_rays(all_points.len());
-    let mut gatherer = backend.gather_evenly(mesh, rays)?;
-    let samples = gatherer.gather(&light_survey::dark(mesh, &corners), &all_points)?;
-    let mut irradiance = vec![Rgb::ZERO; mesh.element_count()];
-    let mut samples = samples.iter();
-    for (e, points) in reflecting.into_iter().zip(points) {
-        let sum: Rgb = samples.by_ref().take(points.len()).map(|s| s.irradiance).sum();
-        irradiance[e] = sum / points.len() as f64;
-    }
-    Ok(ReceivedLight { irradiance, materials: materials.clone() })
 }
 
 fn solve_with_checkpoints(

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use super::GatherPoint;
-use super::luminaire_light::LuminaireLight;
+use super::light_tree::LightTree;
+use super::luminaire_light::{LuminaireLight, SMALL_BOUND};
 use super::two_sided::TwoSidedPoint;
 use super::visible::Visible;
 use crate::sampling::rotation::CellRotation;
-use crate::scene::{Rgb, Scene, Sun};
+use crate::scene::{Luminaire, Rgb, Scene, Sun};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
@@ -17,8 +18,9 @@ const RAYS_TO_SUN: [u32; 2] = [8, 64];
 
 /// The sun and the luminaires of a scene, and what rays to them meet.
 #[derive(Debug)]
-pub(super) struct DirectionalLight {
+pub(crate) struct DirectionalLight {
     scene: Arc<Scene>,
+    luminaires: Arc<LightTree<Luminaire>>,
     rays: Arc<RayScene>,
     panes: Panes,
     rotations: CellRotation,
@@ -26,7 +28,7 @@ pub(super) struct DirectionalLight {
 
 /// What that light adds to the reflected radiosity of a vertex, W/m² per channel.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Direct {
+pub(crate) struct Direct {
     /// If nothing were in its way.
     pub unoccluded: Rgb,
     pub arriving: Rgb,
@@ -44,6 +46,7 @@ impl DirectionalLight {
     /// That of `scene`, if it has a sun or luminaires.
     pub fn of_scene(scene: Arc<Scene>) -> Option<DirectionalLight> {
         scene.has_directional_light().then(|| DirectionalLight {
+            luminaires: LightTree::of_luminaires(&scene),
             rays: RayScene::of_scene(&scene),
             panes: Panes::of_scene(&scene),
             rotations: CellRotation::new(&scene.bounds()),
@@ -75,13 +78,20 @@ impl DirectionalLight {
         let sun = self.scene.sky().sun();
         on_both_sides(point, |point| {
             let of_sun = sun.map_or(Rgb::ZERO, |sun| self.of_sun(sun, point));
-            of_sun + self.luminaires().irradiance(point)
+            of_sun + self.luminaires().irradiance(point, SMALL_BOUND).irradiance
         })
+    }
+
+    /// Irradiance that luminaires cause at `point`, W/m² per channel, coarsely where they are many:
+    /// the source of further bounces.
+    pub fn of_luminaires(&self, point: &GatherPoint) -> Rgb {
+        self.luminaires().irradiance(point, f64::INFINITY).irradiance
     }
 
     fn luminaires(&self) -> LuminaireLight<'_> {
         LuminaireLight {
             luminaires: self.scene.luminaires(),
+            tree: &self.luminaires,
             rays: &self.rays,
             panes: &self.panes,
             rotations: &self.rotations,

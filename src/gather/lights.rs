@@ -1,4 +1,4 @@
-//! Lights: connected emitters, which gatherers sample explicitly.
+//! Lights as the device samples them: connected emitters.
 //!
 //! Emitting triangles of one material and exitance that share corners are one light. From a gather
 //! point, the few lights that could contribute most are sampled one by one (rays to points on
@@ -8,14 +8,13 @@
 //!   direct irradiance = Σ_lights E · F(point → light) · visible share
 //! ```
 //!
-//! All others are left to the samples over the hemisphere, like any other surface.
+//! All others are left to the samples over the hemisphere, like any other surface. On the CPU a
+//! [`LightTree`](super::light_tree) takes all of them.
 
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use super::GatherPoint;
-use crate::form_factor::closed_form::point_to_polygon;
 use crate::geometry::union_find::UnionFind;
 use crate::geometry::weld::position_key;
 use crate::sampling::surface::AreaSampler;
@@ -52,10 +51,6 @@ pub(crate) const NO_LIGHT: u32 = u32::MAX;
 /// Shaders know the value.
 pub(crate) const MAX_EXPLICIT_LIGHTS: usize = 8;
 
-/// Lights whose unoccluded irradiance is below this share of that of all lights are not sampled
-/// explicitly: rays over the hemisphere find them.
-const MIN_IRRADIANCE_SHARE: f64 = 1e-3;
-
 impl Lights {
     /// Finds the lights of `scene`.
     pub fn new(scene: Arc<Scene>) -> Lights {
@@ -80,23 +75,6 @@ impl Lights {
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
-
-    /// The lights that are worth explicit samples from `point`, those with the largest unoccluded
-    /// irradiance first, each with the unoccluded form factor from there to it.
-    pub fn importance_ranked(&self, point: &GatherPoint) -> Vec<(u32, f64)> {
-        let factor = |light: &Light| -> f64 {
-            let corners = light.triangles.iter().map(|&t| self.scene.corners(t as usize));
-            corners.map(|c| point_to_polygon(point.position, point.normal, &c)).sum()
-        };
-        let all = (0..).zip(&self.lights).map(|(k, light)| (k, factor(light)));
-        let mut ranked: Vec<(u32, f64)> = all.filter(|l| l.1 > 0.0).collect();
-        let irradiance = |l: &(u32, f64)| l.1 * self.lights[l.0 as usize].exitance.max_element();
-        let least = MIN_IRRADIANCE_SHARE * ranked.iter().map(irradiance).sum::<f64>();
-        ranked.retain(|l| irradiance(l) > least);
-        ranked.sort_by(|a, b| irradiance(b).total_cmp(&irradiance(a)).then(a.0.cmp(&b.0)));
-        ranked.truncate(MAX_EXPLICIT_LIGHTS);
-        ranked
-    }
 }
 
 impl Light {
@@ -114,7 +92,7 @@ impl Light {
 /// For each of `emitters` (ascending), the lowest one of its material and exitance that it is
 /// connected to by shared corners: itself, if there is no lower one. Triangles of a texture have
 /// their own exitance each.
-fn connected_emitters(scene: &Scene, emitters: &[usize]) -> Vec<usize> {
+pub(super) fn connected_emitters(scene: &Scene, emitters: &[usize]) -> Vec<usize> {
     let mut sets = UnionFind::new(emitters.len());
     let mut first_at_corner: FxHashMap<([u64; 3], u32, [u64; 3]), usize> = FxHashMap::default();
     for (k, &t) in emitters.iter().enumerate() {

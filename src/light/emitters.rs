@@ -135,7 +135,7 @@ fn split(scene: &Scene, all: Vec<usize>) -> Vec<Vec<usize>> {
         // it.
         let (axis, step) = (bounds.longest_axis(), 1e-6 / SQRT_2 * bounds.longest_side());
         let along = |t: usize| ((centre(t) - bounds.low)[axis] / step) as u64;
-        low.sort_by_key(|&t| (along(t), t));
+        low.sort_by_cached_key(|&t| (along(t), t));
         let high = low.split_off(low.len() / 2);
         clusters.extend([low, high].map(|half| (width(&half), half)));
     }

@@ -23,7 +23,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::emitters::{Emitters, Weights};
-use super::luminaires;
+use super::luminaires::Luminaires;
 use crate::progress::BatchSizer;
 use crate::sampling::octaves::Part;
 use crate::sampling::random::random_numbers;
@@ -61,7 +61,8 @@ pub struct PathTracer<'a> {
     rays: Arc<RayScene>,
     panes: Panes,
     normals: Vec<DVec3>,
-    emitters: Emitters,
+    emitters: Arc<Emitters>,
+    luminaires: Arc<Luminaires>,
     /// Surfaces within this distance of each other are in one place, scene unit.
     contact: f64,
     diagonal: f64,
@@ -104,7 +105,8 @@ impl<'a> PathTracer<'a> {
             rays: RayScene::of_scene(&scene),
             panes: Panes::of_scene(&scene),
             normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
-            emitters: Emitters::new(&scene),
+            emitters: scene.derived(Emitters::new),
+            luminaires: scene.derived(|scene| Luminaires::new(scene.luminaires())),
             contact: offset::path_contact(&scene),
             diagonal,
             scene,
@@ -400,7 +402,8 @@ impl<'a> PathTracer<'a> {
     /// Irradiance at `at` from one point of a luminaire, W/m². No path meets one by itself.
     fn irradiance_of_luminaire(&self, at: &SurfacePoint, rng: &mut Rng) -> Rgb {
         let normal = self.normals[at.triangle];
-        let chosen = luminaires::choose(self.scene.luminaires(), at.position, normal, rng);
+        let luminaires = self.scene.luminaires();
+        let chosen = self.luminaires.choose(luminaires, at.position, normal, rng);
         let Some((luminaire, probability)) = chosen else { return Rgb::ZERO };
         let point = luminaire.point([rng.f64(), rng.f64(), rng.f64()]);
         let irradiance = luminaire.irradiance(point, at.position, normal);

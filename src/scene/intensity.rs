@@ -10,7 +10,7 @@
 //! ```
 
 use std::cmp::Ordering;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 use serde::Serialize;
@@ -156,6 +156,18 @@ impl IntensityDistribution {
         }
         let wedges = self.azimuths.windows(2).enumerate();
         wedges.map(|(k, a)| (a[1] - a[0]) * (of_column(k) + of_column(k + 1)) / 2.0).sum()
+    }
+
+    /// Whether nothing goes to directions of 90° and more from the pole, which is the aim.
+    pub(crate) fn is_dark_behind(&self) -> bool {
+        let behind = |k: usize| self.polar[k % self.polar.len()] > FRAC_PI_2 + 1e-9;
+        // At 90° itself one value means the next cell, too.
+        let last_front = self.polar.partition_point(|&angle| angle <= FRAC_PI_2 + 1e-9);
+        let reaches_behind = last_front < self.polar.len() && last_front > 0;
+        let is_lit =
+            |k: usize| behind(k) || reaches_behind && k % self.polar.len() == last_front - 1;
+        self.pole == Pole::Aim
+            && (0..self.values.len()).filter(|&k| is_lit(k)).all(|k| self.values[k] == 0.0)
     }
 
     /// The largest intensity, W/sr.

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::derived::Derived;
 use super::{IntensityDistribution, Rgb, Scene, WarningKind};
 use crate::error::{Error, ErrorKind};
 
@@ -129,6 +130,12 @@ impl Luminaire {
         self.position + local.x * self.c0 + local.y * self.c90() + local.z * self.aim
     }
 
+    /// Intensity along a unit `direction`, W/sr in units of the scale.
+    pub(crate) fn intensity_along(&self, direction: DVec3) -> f64 {
+        let local = [self.c0, self.c90(), self.aim].map(|axis| direction.dot(axis));
+        self.intensity.along(DVec3::from_array(local))
+    }
+
     /// Irradiance at `at` with this unit `normal` if all light comes from `point`, unoccluded; in
     /// units of the scale, 0 behind the surface and at `point` itself.
     pub(crate) fn irradiance(&self, point: DVec3, at: DVec3, normal: DVec3) -> f64 {
@@ -138,9 +145,7 @@ impl Luminaire {
         if cosine.is_nan() || cosine <= 0.0 {
             return 0.0;
         }
-        let local = [self.c0, self.c90(), self.aim].map(|axis| direction.dot(axis));
-        let far = self.intensity.along(DVec3::from_array(local)) * cosine;
-        let irradiance = far / (distance * distance);
+        let irradiance = self.intensity_along(direction) * cosine / (distance * distance);
         if irradiance.is_finite() { irradiance } else { 0.0 }
     }
 }
@@ -161,6 +166,7 @@ impl Scene {
         let numbered = (1..).zip(luminaires);
         self.luminaires =
             numbered.map(|(k, luminaire)| luminaire.checked(k)).collect::<Result<_, _>>()?;
+        self.derived = Derived::default();
         if !self.luminaires.is_empty() {
             self.warnings.retain(|warning| warning.kind != WarningKind::NoLight);
         }

@@ -252,7 +252,7 @@ fn rays_on_devices_go_through_cut_outs() {
         Mesh::new(scene(&room_with_a_sheet(), &Lattice { side: 6, is_solid: board }, SKY), 0.5);
     let light = GivenRadiosity::new(mesh.unwrap(), |e, _| Rgb::splat(0.5 + 0.1 * (e % 5) as f64));
     let (gpu, mesh) = (gpu(), &light.mesh);
-    let rays = Rays { count: 256, noise: f64::INFINITY };
+    let rays = Rays { count: 256, noise: f64::INFINITY, many_lights: false };
     let peak = 1.0 + PI * SKY.max_element();
     same_as_on_the_cpu(&gpu, &light.sources(), &light.places(60, 1e-4), rays, peak);
     let patches = [mesh.root(0), mesh.root(12), mesh.element(5)];

@@ -4,4 +4,5 @@ mod cut_outs;
 mod doubled_faces;
 mod gpu;
 mod luminaires;
+mod many_lights;
 mod panes;

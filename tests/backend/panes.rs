@@ -386,7 +386,7 @@ fn rays_on_devices_go_through_panes() {
     let mesh = Mesh::new(lamp_above_panes(1, COLOURS), 0.5).unwrap();
     let light = GivenRadiosity::new(mesh, |e, _| Rgb::splat(0.5 + 0.1 * (e % 5) as f64));
     let (gpu, mesh) = (gpu(), &light.mesh);
-    let rays = Rays { count: 256, noise: f64::INFINITY };
+    let rays = Rays { count: 256, noise: f64::INFINITY, many_lights: false };
     let lamp = mesh.scene().materials().iter().map(|m| m.exitance.max_element());
     let peak = 1.0 + lamp.fold(0.0, f64::max);
     same_as_on_the_cpu(&gpu, &light.sources(), &light.places(60, 1e-4), rays, peak);

@@ -13,7 +13,6 @@
 mod direct_light;
 mod doubled;
 mod near_field;
-mod point_on;
 mod point_rows;
 mod scene_rays;
 mod wide_light;
@@ -25,8 +24,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
-use crate::gather::lights::NO_LIGHT;
-use crate::gather::luminaire_light::LuminaireLight;
+use crate::gather::luminaire_light::LuminaireIrradiance;
 use crate::gather::visible::Visible;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
@@ -61,6 +59,9 @@ pub struct RayGather {
     dim: f64,
 }
 
+/// The allowed noise in bounds of single lights: 64 errors of random signs are as large as it.
+const BOUNDS_OF_NOISE: f64 = 8.0;
+
 impl RayGather {
     /// About `count` rays per point over the triangles of `mesh`'s scene: the nearest power of two.
     ///
@@ -87,7 +88,7 @@ impl RayGather {
     /// those that see a bright spot through a gap.
     pub fn with_noise(self, noise: f64, dim: f64) -> RayGather {
         let max_rays = max_rays(self.min_rays, noise);
-        let samples = samples(self.scene.lights.scene(), max_rays, self.min_rays);
+        let samples = samples(&self.scene.scene, max_rays, self.min_rays);
         RayGather { samples, max_rays, noise, dim, ..self }
     }
 
@@ -104,11 +105,13 @@ impl RayGather {
         fields: [&RadiosityField; FIELDS],
         point: &GatherPoint,
     ) -> [IrradianceSample; FIELDS] {
-        let direct_light = DirectLight::new(&self.scene, self.min_rays, point);
+        let max_bound = self.noise / BOUNDS_OF_NOISE;
+        let direct_light = DirectLight::new(&self.scene, self.min_rays, point, max_bound);
         let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.cast(range));
         let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
-        let of_luminaires = self.scene.luminaires().irradiance(point);
+        let LuminaireIrradiance { irradiance: of_luminaires, error: of_least } =
+            self.scene.luminaires().irradiance(point, max_bound);
         loop {
             let all = hemisphere.mean() + direct.mean() + of_luminaires;
             let allowed = self.noise * all.length().max(self.dim);
@@ -126,6 +129,7 @@ impl RayGather {
         }
         let (rays, count) = (hemisphere.sums(), hemisphere.count());
         let noise = direct.error().hypot(hemisphere.error());
+        let noise = noise.hypot(direct_light.error()).hypot(of_least);
         let directional = direct.sums().of_sun() + of_luminaires;
         rays.samples(count, [direct.mean() + of_luminaires, directional], noise)
     }
@@ -135,9 +139,9 @@ impl RayGather {
         [self.min_rays, self.max_rays].map(|rays| (rays / RAYS_PER_SHADOW_RAY).max(2))
     }
 
-    /// The light of luminaires.
-    pub(crate) fn luminaires(&self) -> LuminaireLight<'_> {
-        self.scene.luminaires()
+    /// Irradiance of luminaires at `point`, W/m² per channel.
+    pub(crate) fn of_luminaires(&self, point: &GatherPoint) -> Rgb {
+        self.scene.luminaires().irradiance(point, self.noise / BOUNDS_OF_NOISE).irradiance
     }
 
     /// Calls `visit` with the number, from 1, the direction and the hit of each ray of `range` from
@@ -158,8 +162,8 @@ impl RayGather {
         self.scene.surfaces.closest_hits(point.position, directions, point.near, None, visit);
     }
 
-    /// Sums over the rays of `range`. They exclude the emission of lights that `direct` sends rays
-    /// to, and of wide lights, for which the visible share is counted.
+    /// Sums over the rays of `range`. They exclude the emission of lights; of wide ones the visible
+    /// share is counted.
     fn trace<'d, const FIELDS: usize>(
         &self,
         fields: [&RadiosityField; FIELDS],
@@ -167,10 +171,10 @@ impl RayGather {
         direct: &'d DirectLight,
         range: Range<u32>,
     ) -> HemisphereRays<'d, FIELDS> {
-        let SceneRays { panes, lights, rotations, .. } = &self.scene;
+        let SceneRays { scene, panes, rotations, .. } = &self.scene;
         let rotation = rotations.at(point.position, point.near);
         let mut sums = HemisphereRays::none(direct.wide());
-        let sky = lights.scene().sky();
+        let sky = scene.sky();
         let (rays, mut near) = (range.len(), vec![]);
         self.cast(point, rotation, range, |ray, direction, hit| {
             let passed = |end: f64| panes.transmittance(point.position, direction, point.near..end);
@@ -185,10 +189,6 @@ impl RayGather {
                 return;
             }
             let passed = passed(hit.distance);
-            let light = lights.of_triangle[hit.triangle];
-            if light != NO_LIGHT && !direct.samples(light) {
-                out.direct += lights.lights[light as usize].exitance * passed;
-            }
             let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
             if self.near_field.is_some() && NearField::is_near(fields[0].mesh, element, &hit) {
                 near.push(NearRay { hit, direction, passed, ray });
@@ -203,7 +203,7 @@ impl RayGather {
         let is_covered = NearField::is_covered(near.len(), rays);
         for ray in near {
             let path = self.near_field.as_ref().filter(|_| is_covered).map(|near_field| {
-                near_field.light(fields[0].mesh, point, rotation, &ray, !direct.lights().is_empty())
+                near_field.light(fields[0].mesh, point, rotation, &ray, direct.has_lights())
             });
             sums.add_reflected(reflected_near(fields, &ray, path));
         }
@@ -263,7 +263,7 @@ pub(crate) fn samples(scene: &Scene, max_rays: u32, min_rays: u32) -> Hemisphere
 
 /// Sums over rays.
 struct HemisphereRays<'d, const FIELDS: usize> {
-    wide: &'d [WideLight],
+    wide: &'d [WideLight<'d>],
     /// By wide light: number of rays that hit it, and of rays towards it.
     of_wide: Vec<Visible>,
     /// Without reflected light; `direct` is not in `irradiance` yet.
@@ -275,7 +275,7 @@ struct HemisphereRays<'d, const FIELDS: usize> {
 }
 
 impl<'d, const FIELDS: usize> HemisphereRays<'d, FIELDS> {
-    fn none(wide: &'d [WideLight]) -> HemisphereRays<'d, FIELDS> {
+    fn none(wide: &'d [WideLight<'d>]) -> HemisphereRays<'d, FIELDS> {
         HemisphereRays {
             wide,
             of_wide: wide.iter().map(|_| Visible::default()).collect(),

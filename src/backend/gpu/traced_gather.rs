@@ -178,7 +178,7 @@ impl TracedGather {
 
     /// Direct irradiance from luminaires, W/m².
     fn luminaires(&self, point: &GatherPoint) -> Rgb {
-        self.on_cpu.as_ref().map_or(Rgb::ZERO, |gather| gather.luminaires().irradiance(point))
+        self.on_cpu.as_ref().map_or(Rgb::ZERO, |gather| gather.of_luminaires(point))
     }
 
     fn sample(&self, sample: &Sample) -> Result<IrradianceSample, String> {

@@ -65,7 +65,13 @@ fn device_gathers_as_the_cpu_does() {
     let points = light.places(200, 0.01);
     for (count, noise) in [(2, f64::INFINITY), (64, f64::INFINITY), (64, 0.02), (8192, 0.02)] {
         let points = if count > 64 { &points[..20] } else { &points };
-        same_as_on_the_cpu(&gpu, &light.sources(), points, Rays { count, noise }, peak);
+        same_as_on_the_cpu(
+            &gpu,
+            &light.sources(),
+            points,
+            Rays { count, noise, many_lights: false },
+            peak,
+        );
     }
 }
 
@@ -110,7 +116,8 @@ fn device_gathers_all_kinds_of_light() {
             GivenRadiosity::new(mesh, |e, p| Rgb::splat(0.2 + 0.1 * (e % 3) as f64) + p.x.abs());
         let points = light.places(100, 1e-4);
         for (count, noise) in [(256, f64::INFINITY), (64, 0.01)] {
-            same_as_on_the_cpu(&gpu, &light.sources(), &points, Rays { count, noise }, 8.0);
+            let rays = Rays { count, noise, many_lights: name == "twenty lights" };
+            same_as_on_the_cpu(&gpu, &light.sources(), &points, rays, 8.0);
         }
     }
 }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::RayGather;
 use super::direct_light::DirectLight;
 use super::near_field::{NearField, NearLight, NearRay};
-use super::scene_rays::{RAYS_PER_SHADOW_RAY, SceneRays};
+use super::scene_rays::RAYS_PER_SHADOW_RAY;
 use crate::gather::GatherPoint;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
 use crate::gather::visible::Visible;
@@ -17,7 +17,7 @@ use crate::visibility::ray_scene::Hit;
 
 impl PointRows for RayGather {
     fn rows(&self, mesh: &Mesh, point: &GatherPoint, parts: u32) -> Vec<PointRow> {
-        let light = DirectLight::new(&self.scene, self.min_rays, point);
+        let light = DirectLight::new(&self.scene, self.min_rays, point, f64::INFINITY);
         let count = (self.min_rays / parts.max(1)).max(1);
         let parts = (0..parts).map(|part| part * count..(part + 1) * count);
         // The same for all parts: the light of luminaires has almost no noise.
@@ -46,12 +46,7 @@ impl RayGather {
         let mut row = self.row_of_surfaces([mesh, mesh], point, Some(direct), range.clone());
         let scene = mesh.scene();
         let range = range.start / RAYS_PER_SHADOW_RAY..range.end.div_ceil(RAYS_PER_SHADOW_RAY);
-        for &(light, unoccluded) in direct.lights() {
-            let visible = direct.rays_to(light, range.clone());
-            let is_convex = self.scene.lights.lights[light as usize].convex;
-            let factor = mean(visible.seen) * visible.share_of(is_convex.then_some(unoccluded));
-            row.emitters.push((self.material_of(light), factor));
-        }
+        row.emitters.extend(direct.emitters(range.clone()));
         if let Some(sun) = scene.sky().sun() {
             let visible = direct.rays_to_sun(sun, range);
             let cosine = point.normal.dot(sun.direction);
@@ -70,15 +65,13 @@ impl RayGather {
         direct: Option<&DirectLight>,
         range: Range<u32>,
     ) -> PointRow {
-        let SceneRays { lights, rotations, .. } = &self.scene;
-        let rotation = rotations.at(point.position, point.near);
+        let rotation = self.scene.rotations.at(point.position, point.near);
         let share = 1.0 / range.len() as f64;
         let mut row =
             PointRow { share, hits: Vec::with_capacity(range.len()), ..Default::default() };
         // Emission on the way is in no row: rows with lights leave near surfaces as they are.
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
         let (mut near, wide) = (vec![], direct.map_or(&[][..], DirectLight::wide));
-        let has_entry = |light: u32| direct.is_some_and(|direct| direct.samples(light));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
         self.cast(point, rotation, range.clone(), |ray, direction, hit| {
             let passed = |end: f64| self.passed_evenly(point, direction, end);
@@ -94,11 +87,11 @@ impl RayGather {
                 row.backface += share;
                 return;
             }
-            let (passed, light) = (passed(hit.distance), lights.of_triangle[hit.triangle]);
+            let passed = passed(hit.distance);
             if near_field.is_some() && NearField::is_near_at(source, &hit) {
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
-            row.hits.push(surface_hit(mesh, &hit, passed, !has_entry(light)));
+            row.hits.push(surface_hit(mesh, &hit, passed, direct.is_none()));
         });
         let is_covered = NearField::is_covered(near.len(), range.len());
         if let Some(near_field) = near_field.filter(|_| is_covered) {
@@ -108,7 +101,7 @@ impl RayGather {
             }
         }
         for (wide, visible) in wide.iter().zip(&of_wide) {
-            row.emitters.push((self.material_of(wide.light), mean(wide.form_factor(visible))));
+            row.emitters.push((wide.patch.material, mean(wide.form_factor(visible))));
         }
         row
     }
@@ -117,12 +110,6 @@ impl RayGather {
     fn passed_evenly(&self, point: &GatherPoint, direction: DVec3, end: f64) -> Rgb {
         let reach = point.near..end;
         Rgb::splat(mean(self.scene.panes.transmittance(point.position, direction, reach)))
-    }
-
-    fn material_of(&self, light: u32) -> u32 {
-        let lights = &self.scene.lights;
-        let first = lights.lights[light as usize].triangles[0];
-        lights.scene().triangles()[first as usize].material
     }
 }
 

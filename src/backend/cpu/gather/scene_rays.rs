@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::gather::lights::Lights;
+use crate::gather::light_tree::LightTree;
+use crate::gather::light_tree::patch::Patch;
 use crate::gather::luminaire_light::LuminaireLight;
 use crate::mesh::Mesh;
 use crate::sampling::rotation::CellRotation;
+use crate::scene::{Luminaire, Scene};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
@@ -15,9 +17,11 @@ pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
 /// Surfaces, clear panes and lights of a scene, and the rotation of rays at each of its points.
 #[derive(Debug)]
 pub(super) struct SceneRays {
+    pub scene: Arc<Scene>,
     pub surfaces: Arc<RayScene>,
     pub panes: Panes,
-    pub lights: Lights,
+    pub lights: Arc<LightTree<Patch>>,
+    luminaires: Arc<LightTree<Luminaire>>,
     pub rotations: CellRotation,
 }
 
@@ -25,9 +29,11 @@ impl SceneRays {
     /// Those of the scene of `mesh`.
     pub fn new(mesh: &Mesh) -> SceneRays {
         SceneRays {
+            scene: mesh.shared_scene(),
             surfaces: RayScene::of_scene(mesh.scene()),
             panes: Panes::of_scene(mesh.scene()),
-            lights: Lights::new(mesh.shared_scene()),
+            lights: LightTree::of_emitters(mesh.scene()),
+            luminaires: LightTree::of_luminaires(mesh.scene()),
             rotations: CellRotation::new(&mesh.scene().bounds()),
         }
     }
@@ -35,7 +41,8 @@ impl SceneRays {
     /// The light of luminaires.
     pub fn luminaires(&self) -> LuminaireLight<'_> {
         LuminaireLight {
-            luminaires: self.lights.scene().luminaires(),
+            luminaires: self.scene.luminaires(),
+            tree: &self.luminaires,
             rays: &self.surfaces,
             panes: &self.panes,
             rotations: &self.rotations,

@@ -13,66 +13,48 @@
 
 use glam::DVec3;
 
-use crate::gather::GatherPoint;
-use crate::gather::lights::Light;
-use crate::sampling::low_discrepancy::sobol_02_point;
-use crate::scene::{Rgb, Scene};
-
-use super::point_on::point_on;
 use super::scene_rays::RAYS_PER_SHADOW_RAY;
+use crate::gather::GatherPoint;
+use crate::gather::light_tree::patch::Patch;
 use crate::gather::visible::Visible;
+use crate::sampling::low_discrepancy::sobol_02_point;
+use crate::scene::Rgb;
 
 /// A light seen from a point.
-pub(super) struct WideLight {
-    pub light: u32,
+pub(super) struct WideLight<'a> {
+    pub patch: &'a Patch,
     /// Unoccluded form factor from the point to all of it.
     unoccluded: f64,
-    exitance: Rgb,
     /// Inward normals of the pyramids from the point to its triangles.
     pyramids: Vec<[DVec3; 3]>,
 }
 
-impl WideLight {
-    /// The light `light` with this number and unoccluded form factor, seen from `point`.
+impl<'a> WideLight<'a> {
+    /// `patch`, which causes this `irradiance` at `point` if nothing is in the way; none unless
+    /// rays over the hemisphere estimate its visible share better than points on it.
     pub fn new(
-        light: &Light,
-        number: u32,
-        unoccluded: f64,
-        scene: &Scene,
+        patch: &'a Patch,
+        irradiance: Rgb,
         point: &GatherPoint,
-    ) -> WideLight {
-        let pyramid = |&t: &u32| {
-            let [a, b, c] = scene.corners(t as usize).map(|corner| corner - point.position);
+        min_rays: u32,
+    ) -> Option<WideLight<'a>> {
+        let unoccluded = irradiance.element_sum() / patch.exitance.element_sum();
+        if !is_wide(patch, unoccluded, point, min_rays) {
+            return None;
+        }
+        let pyramid = |corners: [DVec3; 3]| {
+            let [a, b, c] = corners.map(|corner| corner - point.position);
             let (ab, bc, ca) = (b.cross(a), c.cross(b), a.cross(c));
             // It emits nothing backwards.
             (a.dot(bc) > 0.0).then_some([ab, bc, ca])
         };
-        let pyramids = light.triangles.iter().filter_map(pyramid).collect();
-        WideLight { light: number, unoccluded, exitance: light.exitance, pyramids }
+        let pyramids = patch.triangles.iter().filter_map(|t| pyramid(t.corners)).collect();
+        Some(WideLight { patch, unoccluded, pyramids })
     }
 
-    /// Whether rays over the hemisphere estimate the visible share of `light` from `point` better
-    /// than points on it, one per [`RAYS_PER_SHADOW_RAY`] of at least `min_rays` rays: whether more
-    /// of them go towards it than the effective number of such points. n points of weights w have
-    /// the effective number (Σ w)² / Σ w² (Kish 1965, section 11.7).
-    pub fn is_wide(
-        light: &Light,
-        unoccluded: f64,
-        scene: &Scene,
-        point: &GatherPoint,
-        min_rays: u32,
-    ) -> bool {
-        // Of fewer than 8 expected rays there may be none: of independent ones with a probability
-        // above e⁻⁸.
-        if !light.convex || f64::from(min_rays) * unoccluded < 8.0 {
-            return false;
-        }
-        let count = 32; // plain choice
-        let weights = (0..count).map(|i| point_on(light, scene, point, sobol_02_point(i)).factor);
-        let (sum, squares) =
-            weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
-        let worth = sum * sum / (squares * f64::from(count)).max(f64::MIN_POSITIVE);
-        unoccluded * f64::from(RAYS_PER_SHADOW_RAY) > worth
+    /// Whether this triangle of the scene is part of it.
+    pub fn has(&self, triangle: usize) -> bool {
+        self.patch.triangles.iter().any(|t| t.number as usize == triangle)
     }
 
     /// Whether the light, occluded or not, lies in a `direction` above the horizon.
@@ -97,6 +79,23 @@ impl WideLight {
 
     /// Its irradiance for this `visible` part.
     pub fn irradiance(&self, visible: &Visible) -> Rgb {
-        self.exitance * self.form_factor(visible)
+        self.patch.exitance * self.form_factor(visible)
     }
+}
+
+/// Whether rays over the hemisphere estimate the visible share of `patch` from `point` better than
+/// points on it, one per [`RAYS_PER_SHADOW_RAY`] of at least `min_rays` rays: whether more of them
+/// go towards it than the effective number of such points. n points of weights w have the effective
+/// number (Σ w)² / Σ w² (Kish 1965, section 11.7).
+fn is_wide(patch: &Patch, unoccluded: f64, point: &GatherPoint, min_rays: u32) -> bool {
+    // Of fewer than 8 expected rays there may be none: of independent ones with a probability
+    // above e⁻⁸.
+    if f64::from(min_rays) * unoccluded < 8.0 {
+        return false;
+    }
+    let count = 32; // plain choice
+    let weights = (0..count).map(|i| patch.factor(&patch.point(sobol_02_point(i)), point));
+    let (sum, squares) = weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
+    let worth = sum * sum / (squares * f64::from(count)).max(f64::MIN_POSITIVE);
+    unoccluded * f64::from(RAYS_PER_SHADOW_RAY) > worth
 }

@@ -26,6 +26,7 @@ use crate::backend::gpu::test_support::{
     traced_scenes, under_sky_and_sun,
 };
 use crate::backend::gpu::traced_scene::TracedArrays;
+use crate::form_factor::closed_form::point_to_polygon;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::scene::{IntensityDistribution, Luminaire};
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -261,8 +262,11 @@ fn twin_ranks_lights_as_closed_forms_do() {
         let arrays = TracedArrays::new(&lights);
         for at in gather_points(&mesh, 24) {
             let point = traced(&arrays, &at);
-            for (number, truth) in lights.importance_ranked(&at) {
-                let actual = factor_of(&arrays, &arrays.lights[number as usize], &point);
+            for (number, light) in lights.lights.iter().enumerate() {
+                let corners = |&t: &u32| lights.scene().corners(t as usize);
+                let factor = |c: [DVec3; 3]| point_to_polygon(at.position, at.normal, &c);
+                let truth: f64 = light.triangles.iter().map(corners).map(factor).sum();
+                let actual = factor_of(&arrays, &arrays.lights[number], &point);
                 // Near the horizon the visible part of a light is a sliver, with an error of a few
                 // roundings of the whole.
                 let limit = 1e-4 * truth + 16.0 * ROUNDING;
