@@ -16,6 +16,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("accuracy", "error"),
     ("visibility", "error geometry sampling scene"),
     ("light", "error geometry progress sampling scene visibility"),
+    ("glare", "error geometry light sampling scene"),
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
     ("form_factor", "error geometry mesh scene"),

@@ -237,6 +237,34 @@ impl<'a> PathTracer<'a> {
         passed * (reflected - known(&hit))
     }
 
+    /// The radiosity of what is seen from `position` along unit `direction` without the light that
+    /// surfaces emit themselves, by one path, W/m², unbiased: π times the radiance of the sky, or
+    /// what a surface reflects.
+    pub(crate) fn reflected_towards(
+        &self,
+        position: DVec3,
+        direction: DVec3,
+        rng: &mut Rng,
+    ) -> Rgb {
+        if self.first_hit(position, direction, self.contact, None).is_some() {
+            return self.missed(position, direction, self.contact, |_| Rgb::ZERO, rng);
+        }
+        let reach = self.contact..f64::INFINITY;
+        let passed = self.panes.transmittance(position, direction, reach);
+        passed * PI * self.scene.sky().radiance(direction)
+    }
+
+    /// The share per channel of light from `to`, a place on triangle `on` if it is on one, that
+    /// arrives at `from`.
+    pub(crate) fn passed_to(&self, from: DVec3, to: DVec3, on: Option<usize>) -> Rgb {
+        let (direction, distance) = (to - from).normalize_and_length();
+        let between = self.contact..distance - self.contact;
+        if self.rays.occluded(from, direction, between.clone(), |hit| Some(hit.triangle) != on) {
+            return Rgb::ZERO;
+        }
+        self.panes.transmittance(from, direction, between)
+    }
+
     /// Takes a path one surface further from `at`: adds the light that arrives at `at` to what is
     /// `reflected`, W/m², moves `at` to the next hit, and multiplies `throughput` by what panes on
     /// the way let through. None where the path leaves or meets a back.

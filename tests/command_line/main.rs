@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod bands;
+mod daylight;
 mod emit;
 mod heat;
 mod heat_tables;

@@ -74,6 +74,9 @@ impl Options {
     pub fn run(mut self) -> Result<(), Stop> {
         self.output.name(self.scene.with_extension(""), &["csv", "png"])?;
         self.light.reading.needs_up = self.planes.is_empty();
+        if self.photometric {
+            self.light.reading.sky.be_photometric();
+        }
         let scene = self.light.scene(&self.scene)?;
         // Before the bake, which may take minutes.
         let grids = self.grids(&scene)?;
