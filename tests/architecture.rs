@@ -29,6 +29,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ),
     ("path_correction", "error gather light progress sampling scene visibility"),
     ("grid", "error gather geometry path_correction scene visibility"),
+    ("daylight", "error gather light progress sampling scene visibility"),
     ("probe", "error gather path_correction progress scene visibility"),
     ("view_factor", "error form_factor geometry ranks sampling scene visibility"),
     ("heat", "error geometry linear view_factor"),

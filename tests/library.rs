@@ -14,6 +14,7 @@ mod bake;
 mod bands;
 mod camera;
 mod common;
+mod daylight;
 mod form_factor;
 mod gather;
 mod glare;

@@ -1,7 +1,75 @@
-//! `radiosity ugr`.
+//! `radiosity grid --weather` and `radiosity ugr`.
 
-use crate::light::{number, table};
+use crate::light::{ground, number, table};
+use crate::weather::epw_at;
 use crate::{run, texts, write};
+
+/// Sun alone, day and night, at 0° north and east: it is up from about 6 to 18 h, so in all
+/// occupied hours, and half of the year.
+#[test]
+fn a_year_of_sun_on_open_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = ground(folder.path()).display().to_string();
+    let weather = write(folder.path(), "sun.epw", &epw_at([0.0; 3], |_, _| [900.0, 0.0]));
+    let weather = weather.display().to_string();
+    let args = [&scene, "--weather", &weather, "--unit", "mm", "--up", "0,0,1"];
+    let plane = ["--plane", "4000,0,3000,1000,0,0,0,1000,0", "--spacing", "1"];
+    let out = run("grid", &[&args[..], &plane].concat());
+    let [said, warned] = texts(&out);
+    assert!(out.status.success(), "{warned}");
+    let rows = table(&folder.path().join("ground.grid.csv"));
+    assert_eq!(rows.len(), 2, "{rows:?}");
+    let of = |name: &str| number(&rows[1][rows[0].iter().position(|cell| cell == name).unwrap()]);
+    assert_eq!(of("sun_hours"), 3650.0);
+    // The lowest sun, at 17:30 or 8:30 with 16 minutes of the equation of time, is 3° high.
+    assert_eq!(
+        (of("da_percent"), of("da_error"), of("udi_above_3000_percent")),
+        (100.0, 0.0, 100.0)
+    );
+    assert_eq!((of("inside"), of("udi_below_100_percent")), (0.0, 0.0));
+    // Nothing is reflected or random: 8760 hours of 900 W/m² by about 100 lm/W, times the mean of
+    // the sine over day and night, cos δ/π, of which the equator's year has 0.3 on average.
+    let exposure = 8760.0 * 9e4 * 0.305;
+    assert!((of("exposure_lxh") / exposure - 1.0).abs() < 0.05 && of("exposure_error_lxh") == 0.0);
+    for words in ["sDA300/50% 100.0 %", "ASE1000,250 100.0 %", "mean DA300 100.0 %", "5 % reached"]
+    {
+        assert!(said.contains(words), "'{words}' not in: {said}");
+    }
+    assert!(folder.path().join("ground.grid.png").exists());
+
+    // In another time zone the sun has set before the last of them.
+    let east = epw_at([0.0, 0.0, 1.0], |_, _| [900.0, 0.0]);
+    write(folder.path(), "sun.epw", &east);
+    let hours = ["--hours", "17,20", "--target", "1e6"];
+    let out = run("grid", &[&args[..], &plane, &hours].concat());
+    let rows = table(&folder.path().join("ground.grid.csv"));
+    let of = |name: &str| number(&rows[1][rows[0].iter().position(|cell| cell == name).unwrap()]);
+    // 17 to 18 h is an hour before sunset; of the next some days have a sun in the middle of it,
+    // 15 minutes high at most.
+    assert!((365.0..=730.0).contains(&of("sun_hours")), "{rows:?}");
+    assert_eq!(of("da_percent"), 0.0);
+    assert!(texts(&out)[0].contains("sDA1000000/50% 0.0 %"), "{:?}", texts(&out));
+}
+
+#[test]
+fn what_a_year_cannot_be_made_of_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = ground(folder.path()).display().to_string();
+    let weather = write(folder.path(), "sun.epw", &epw_at([0.0; 3], |_, _| [900.0, 0.0]));
+    let args = [&scene, "--weather", weather.to_str().unwrap(), "--unit", "mm", "--up", "0,0,1"];
+    for (more, word) in [
+        (&["--sky", "1"][..], "leave out --sky"),
+        (&["--hours", "18,8"], "the earlier first"),
+        (&["--target", "0"], "above 0"),
+        (&["--weather", "none.epw"], "none.epw"),
+    ] {
+        let out = run("grid", &[&args[..], more].concat());
+        let error = &texts(&out)[1];
+        assert!(!out.status.success() && error.contains(word), "'{word}' not in: {error}");
+    }
+    let out = run("grid", &[&scene, "--hours", "8,18"]);
+    assert!(texts(&out)[1].contains("--weather"), "{:?}", texts(&out));
+}
 
 #[test]
 fn glare_of_observers_is_printed_and_listed() {

@@ -24,7 +24,7 @@ pub struct MeasuredSky {
 }
 
 /// That of 2 cm of water, the mean of the data that the model of efficacy is fitted to.
-const DEW_POINT: f64 = 11.0;
+pub const DEW_POINT: f64 = 11.0;
 
 impl MeasuredSky {
     /// `DNI,DHI` or `DNI,DHI,DEW_POINT`.

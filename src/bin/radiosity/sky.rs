@@ -8,7 +8,7 @@ use radiosity::io::read_radiance;
 use radiosity::scene::SkyDistribution;
 use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, Sun};
 
-use crate::args::{self, Parsed, give};
+use crate::args::{self, Parsed, Stop, give};
 use crate::measured_sky::MeasuredSky;
 use crate::sun::{GivenSun, SunPlace, sun_at, sun_towards};
 
@@ -36,7 +36,7 @@ pub struct SkyOptions {
     /// Direction away from the ground [default: +y or +z, by names, comments, lamps and geometry]
     #[arg(long, value_name = "x,y,z", value_parser = direction)]
     up: Option<DVec3>,
-    /// Direction of north, for --sun-at [default: -z; +y where +z is up]
+    /// Direction of north, for --sun-at and --weather [default: -z; +y where +z is up]
     #[arg(long, value_name = "x,y,z", hide = true, value_parser = direction)]
     north: Option<DVec3>,
 }
@@ -81,6 +81,23 @@ impl SkyOptions {
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
     pub fn is_default(&self) -> bool {
         self.kind.is_none() && self.given_sun().is_none()
+    }
+
+    /// Says that the weather of a year takes the place of all skies: the scene is read under one.
+    ///
+    /// # Errors
+    /// [`Stop::Usage`] where a sky or a sun is given.
+    pub fn be_of_weather(&mut self) -> Result<(), Stop> {
+        if !self.is_default() {
+            return Err(Stop::usage("--weather brings sky and sun: leave out --sky and --sun"));
+        }
+        self.kind = Some(Kind::Uniform(Rgb::ONE));
+        Ok(())
+    }
+
+    /// Direction of north, if given.
+    pub fn north(&self) -> Option<DVec3> {
+        self.north
     }
 
     /// Says that light is in lumens: irradiance by `--sky irradiance` is converted.
