@@ -143,7 +143,10 @@ impl MeasuringGrid {
     }
 
     /// The points as they gather.
-    fn gather_points(&self, scene: &Scene) -> Result<Vec<GatherPoint>, Error> {
+    ///
+    /// # Errors
+    /// Those of [`GridPlane::normal`].
+    pub fn gather_points(&self, scene: &Scene) -> Result<Vec<GatherPoint>, Error> {
         let normal = self.plane.normal()?;
         let [a, b] = self.cell();
         let above = |&p: &DVec3| GatherPoint::above(scene, p, normal, a.min(b));

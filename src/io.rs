@@ -6,6 +6,7 @@
 //! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
 //! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
 //! | IESNA LM-63, EULUMDAT | [`PhotometrySettings`] | the light distribution of a luminaire |
+//! | EPW | [`read_epw`] | the weather of a year at a place |
 //! | PLY | [`write_ply`], [`read_ply`] | a mesh with radiosity at its vertices |
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
@@ -14,6 +15,7 @@
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
 //! | NumPy's `.npz` (feature `npz`) | `write_npz`, `read_npz` | the same, as SciPy's sparse rows |
 
+mod epw;
 #[cfg(feature = "exr")]
 mod exr;
 mod files;
@@ -56,6 +58,7 @@ pub use self::glb::write_light_map_glb;
 pub use self::glb::{GlbSettings, write_glb};
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
+pub use epw::{Weather, WeatherRecord, epw_from_text, read_epw};
 pub use files::read_text;
 #[cfg(feature = "npz")]
 pub use npz::{npz_from_bytes, read_npz, write_npz};

@@ -57,6 +57,8 @@
 //! | [`solver`] | shooting, Gauss–Seidel, GMRES and others; save, resume, change |
 //! | [`gather`], [`vertex`] | irradiance at points; radiosity at vertices, refined where it bends |
 //! | [`grid`], [`probe`] | light on measuring grids; spherical harmonics at points in the air |
+//! | [`daylight`] | a year of daylight at points, by daylight coefficients |
+//! | [`glare`] | the unified glare rating of an observer, by paths alone |
 //! | [`path_correction`] | values at points corrected by paths, with their errors |
 //! | [`backend`] | who makes rows and gathers: [`backend::gpu`] or [`backend::cpu`] |
 //! | [`bake`] | all of it to an error or within a time, with an estimate of the error |
@@ -107,10 +109,12 @@ pub mod backend;
 pub mod bake;
 pub mod bands;
 pub mod camera;
+pub mod daylight;
 mod error;
 pub mod form_factor;
 pub mod gather;
 mod geometry;
+pub mod glare;
 pub mod grid;
 pub mod heat;
 pub mod hemicube;

@@ -5,4 +5,4 @@ mod luminaires;
 mod path_tracer;
 
 pub use path_tracer::{PathTracer, Reflected, SurfacePoint};
-pub(crate) use path_tracer::{nearest_surfaces, random_point};
+pub(crate) use path_tracer::{Visit, nearest_surfaces, random_point};

@@ -24,6 +24,7 @@ mod sides;
 mod sky;
 mod sky_distribution;
 mod sky_map;
+mod solar_irradiance;
 mod specular;
 pub mod texture;
 mod textured;
@@ -57,6 +58,7 @@ pub use sky::{Sky, Sun};
 pub use sky_distribution::SkyDistribution;
 #[cfg(feature = "gpu")]
 pub(crate) use sky_map::SkyMap;
+pub use solar_irradiance::{LuminousEfficacy, SolarIrradiance};
 pub use specular::Specular;
 use texture::MaterialTextures;
 pub use up_axis::UpAxis;

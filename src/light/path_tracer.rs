@@ -77,6 +77,17 @@ pub struct SurfacePoint {
     pub position: DVec3,
 }
 
+/// What a path meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Visit {
+    /// The sky, and the share of its radiosity, π times its radiance, that arrives.
+    Sky { direction: DVec3, share: Rgb },
+    /// A surface, and the share of its irradiance that arrives.
+    Surface { at: SurfacePoint, share: Rgb },
+    /// A back: nothing arrives.
+    Back { is_first: bool },
+}
+
 /// What a point reflects, estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reflected {
@@ -239,6 +250,74 @@ impl<'a> PathTracer<'a> {
         passed * (reflected - known(&hit))
     }
 
+    /// The radiosity of what is seen from `position` along unit `direction` without the light that
+    /// surfaces emit themselves, by one path, W/m², unbiased: π times the radiance of the sky, or
+    /// what a surface reflects.
+    pub(crate) fn reflected_towards(
+        &self,
+        position: DVec3,
+        direction: DVec3,
+        rng: &mut Rng,
+    ) -> Rgb {
+        if self.first_hit(position, direction, self.contact, None).is_some() {
+            return self.missed(position, direction, self.contact, |_| Rgb::ZERO, rng);
+        }
+        let reach = self.contact..f64::INFINITY;
+        let passed = self.panes.transmittance(position, direction, reach);
+        passed * PI * self.scene.sky().radiance(direction)
+    }
+
+    /// Follows a path from `position` along unit `direction`, further than `near` at first, and
+    /// tells `visit` what it meets; shares are of light that arrives at its start.
+    pub(crate) fn walk(
+        &self,
+        position: DVec3,
+        direction: DVec3,
+        near: f64,
+        rng: &mut Rng,
+        visit: &mut impl FnMut(Visit, &mut Rng),
+    ) {
+        let (mut from, mut direction, mut start, mut ignored) = (position, direction, near, None);
+        let mut share = Rgb::ONE;
+        loop {
+            let hit = self.first_hit(from, direction, start, ignored);
+            let end = hit.map_or(f64::INFINITY, |hit| hit.distance - self.contact);
+            share *= self.panes.transmittance(from, direction, start..end);
+            let Some(hit) = hit else { return visit(Visit::Sky { direction, share }, rng) };
+            if !hit.front {
+                return visit(Visit::Back { is_first: ignored.is_none() }, rng);
+            }
+            let position = from + hit.distance * direction;
+            let mut at = SurfacePoint { triangle: hit.triangle, position };
+            let Some(reflected) = self.scatter_at(&mut at, &hit, rng) else { return };
+            share *= reflected;
+            visit(Visit::Surface { at, share }, rng);
+            direction = cosine_weighted(self.normals[at.triangle], rng).0;
+            (from, start, ignored) = (at.position, self.contact, Some(at.triangle));
+        }
+    }
+
+    /// The share per channel of light from far along unit `direction` that arrives at `from`,
+    /// whatever is nearer than `near`.
+    pub(crate) fn passed_beyond(&self, from: DVec3, direction: DVec3, near: f64) -> Rgb {
+        let reach = near..f64::INFINITY;
+        if self.rays.occluded(from, direction, reach.clone(), |_| true) {
+            return Rgb::ZERO;
+        }
+        self.panes.transmittance(from, direction, reach)
+    }
+
+    /// The share per channel of light from `to`, a place on triangle `on` if it is on one, that
+    /// arrives at `from`.
+    pub(crate) fn passed_to(&self, from: DVec3, to: DVec3, on: Option<usize>) -> Rgb {
+        let (direction, distance) = (to - from).normalize_and_length();
+        let between = self.contact..distance - self.contact;
+        if self.rays.occluded(from, direction, between.clone(), |hit| Some(hit.triangle) != on) {
+            return Rgb::ZERO;
+        }
+        self.panes.transmittance(from, direction, between)
+    }
+
     /// Takes a path one surface further from `at`: adds the light that arrives at `at` to what is
     /// `reflected`, W/m², moves `at` to the next hit, and multiplies `throughput` by what panes on
     /// the way let through. None where the path leaves or meets a back.
@@ -388,7 +467,7 @@ impl<'a> PathTracer<'a> {
     }
 
     /// Irradiance at `at` from one point of the sun, W/m². No path meets the sun by itself.
-    fn irradiance_of_sun(&self, at: &SurfacePoint, sun: &Sun, rng: &mut Rng) -> Rgb {
+    pub(crate) fn irradiance_of_sun(&self, at: &SurfacePoint, sun: &Sun, rng: &mut Rng) -> Rgb {
         let direction = sun.towards([rng.f64(), rng.f64()]);
         let cosine = self.normals[at.triangle].dot(direction);
         let between = self.contact..f64::INFINITY;

@@ -11,6 +11,7 @@
 //! opening have the same distribution, scaled by their fraction of the opening: only the far field
 //! is known (IES Lighting Handbook, 10th edition 2011, 9.7: the far field).
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -107,6 +108,17 @@ impl Luminaire {
     /// The diagonal of the opening, scene unit.
     pub(crate) fn extent(&self) -> f64 {
         self.opening.size.length()
+    }
+
+    /// Area of the opening as it is seen along unit `direction`, scene unit squared.
+    pub(crate) fn projected_area(&self, direction: DVec3) -> f64 {
+        let [x, y, z] = [self.c0, self.c90(), self.aim].map(|axis| axis.dot(direction).abs());
+        let DVec3 { x: length, y: width, z: height } = self.opening.size;
+        match self.opening.is_round {
+            false => length * width * z + height * (width * x + length * y),
+            // An ellipse, and the width of its shadow.
+            true => PI / 4.0 * length * width * z + height * (length * y).hypot(width * x),
+        }
     }
 
     /// The distance from `at` to the box around the opening, scene unit.

@@ -100,6 +100,11 @@ const PEREZ: [[[f64; 4]; 5]; 8] = [
     ],
 ];
 
+/// The class of a clearness, from 0 to 7 (Perez et al. 1990, table 1).
+pub(super) fn clearness_class(clearness: f64) -> usize {
+    [1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2].partition_point(|&least| least <= clearness)
+}
+
 impl SkyDistribution {
     /// The overcast sky, 1 + 2 sin of the elevation (Moon and Spencer 1942): a third of the zenith
     /// at the horizon. The irradiance of open ground is 7π/9 times the zenith's radiance.
@@ -123,9 +128,7 @@ impl SkyDistribution {
         if !all.iter().all(|x| x.is_finite() && *x >= 0.0) {
             return None;
         }
-        // Perez et al. 1990, table 1.
-        let line =
-            [1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2].partition_point(|&least| least <= clearness);
+        let line = clearness_class(clearness);
         // The range of the model's fit.
         let brightness = if line > 0 && line < 5 { brightness.max(0.2) } else { brightness };
         let linear =
@@ -144,7 +147,7 @@ impl SkyDistribution {
 
     /// Radiance relative to the zenith, 0 or more, as a function of the cosines of the angles from
     /// the zenith, above 0, and from the sun. `sun` is the cosine of the sun's zenith angle.
-    pub(super) fn relative_to_zenith(self, sun: f64) -> impl Fn(f64, f64) -> f64 {
+    pub(crate) fn relative_to_zenith(self, sun: f64) -> impl Fn(f64, f64) -> f64 {
         let absolute = move |up: f64, from_sun: f64| match self.0 {
             Kind::Traditional => 1.0 + 2.0 * up,
             Kind::Graded([a, b, c, d, e]) => {

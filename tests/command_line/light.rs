@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{device, run, write};
 
 /// A black ground of 6 m by 4 m in millimetres, and a block on it without a bottom.
-fn ground(folder: &Path) -> PathBuf {
+pub fn ground(folder: &Path) -> PathBuf {
     let scene = "mtllib ground.mtl\nusemtl black\n\
                  o ground\nv 0 0 0\nv 6000 0 0\nv 6000 4000 0\nv 0 4000 0\nf 1 2 3 4\n\
                  o block\nv 1000 1000 0\nv 2000 1000 0\nv 2000 2000 0\nv 1000 2000 0\n\
@@ -17,12 +17,12 @@ fn ground(folder: &Path) -> PathBuf {
 }
 
 /// The lines of a CSV file as words, its header first.
-fn table(path: &Path) -> Vec<Vec<String>> {
+pub fn table(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
     text.lines().map(|line| line.split(',').map(String::from).collect()).collect()
 }
 
-fn number(word: &str) -> f64 {
+pub fn number(word: &str) -> f64 {
     word.parse().unwrap()
 }
 
@@ -74,6 +74,30 @@ fn grid_measures_above_each_floor_and_above_groups() {
     let out = run("grid", &args);
     let error = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(1) && error.contains("'ground', 'block'"), "{error}");
+}
+
+/// Measured irradiance in lux: DNI and DHI times the efficacy of each, as tested in
+/// `scene::solar_irradiance`; the sun 40° from the zenith, at its mean distance.
+#[test]
+fn measured_irradiance_is_converted_to_lux() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = ground(folder.path());
+    let (sine, cosine) = 40f64.to_radians().sin_cos();
+    let sun = format!("{sine},0,{cosine}");
+    let mut args = vec![scene.to_str().unwrap(), "--unit", "mm", "--group", "block"];
+    args.extend(["--up", "0,0,1", "--sky", "irradiance:850,90,5", "--sun", &sun, "--cpu"]);
+    for (more, truth) in [
+        (&["--photometric"][..], 850.0 * cosine * 102.140_409_206 + 90.0 * 137.567_988_611),
+        (&[], 850.0 * cosine + 90.0),
+    ] {
+        let out = run("grid", &[&args, more].concat());
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let rows = table(&folder.path().join("ground.grid.csv"));
+        // The share of the sky, 12 %, by some hundred rays: within 5 % of itself.
+        for row in &rows[1..] {
+            assert!((number(&row[6]) / truth - 1.0).abs() < 6e-3, "{row:?} {truth}");
+        }
+    }
 }
 
 /// Width and height of a PNG image, by its header.

@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod bands;
+mod daylight;
 mod emit;
 mod heat;
 mod heat_tables;
@@ -14,6 +15,8 @@ mod trade_off;
 mod usage;
 mod view_factors;
 mod viewer;
+#[path = "../common/weather.rs"]
+mod weather;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};

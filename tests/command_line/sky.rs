@@ -95,6 +95,33 @@ fn skies_and_suns_are_named_on_the_command_line() {
     near(sky(&morning), 10.0 * 23.44f64.to_radians().sin().powi(2));
 }
 
+/// Measured irradiance: level ground receives DNI · cos Z + DHI, whatever the sky's distribution.
+#[test]
+fn a_sky_is_given_by_its_irradiance() {
+    let folder = tempfile::tempdir().unwrap();
+    for (sky, sun, truth) in [
+        ("irradiance:0,100", ["--sun", "0,3,4"], 100.0),
+        ("irradiance:800,100", ["--sun", "0,3,4"], 800.0 * 0.6 + 100.0),
+        ("irradiance:500,0", ["--sun", "0,3,4"], 500.0 * 0.6),
+        // Straight above, as in `skies_and_suns_are_named_on_the_command_line`.
+        ("irradiance:300,250,15", ["--sun-at", "0,0,2026-03-20T12:07:30Z"], 550.0),
+    ] {
+        let options = [&["--sky", sky][..], &sun].concat();
+        let (solution, report) = ground_under(folder.path(), &options);
+        let found = irradiance(&solution);
+        // A few hundred rays near a bright sun's halo, half of them stratified: 1 %.
+        assert!((found / truth - 1.0).abs() < 1e-2, "{sky}: {found} {truth}");
+        if sky.ends_with(",0") {
+            continue;
+        }
+        let again = report["sky"].as_str().unwrap();
+        assert!(again.starts_with("perez:"), "{again}");
+        let typed: Vec<&str> = ["--sky"].into_iter().chain(again.split(' ')).collect();
+        let (same, report) = ground_under(folder.path(), &typed);
+        assert!((irradiance(&same) / found - 1.0).abs() < 1e-5 && report["sky"] == again);
+    }
+}
+
 #[test]
 fn the_sun_rises_in_the_east() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,10 +220,14 @@ fn wrong_skies_and_suns_are_refused() {
         ("--sky", "perez:0.5,0.1", "--sky"),
         ("--zenith", "bright", "r,g,b"),
         ("--up", "0,0,0", "not zero"),
-        ("--sun", "0,1,0", "x,y,z=IRRADIANCE"),
+        ("--sun", "0,1", "x,y,z=IRRADIANCE"),
         ("--sun", "0,0,0=1", "direction"),
         ("--sun", "0,1,0=-1", "at least 0"),
         ("--zenith", "1,1,1", "add --sky overcast"),
+        ("--sky", "irradiance:800", "irradiance:DNI,DHI"),
+        ("--sky", "irradiance:800,-1", "irradiance:DNI,DHI"),
+        ("--sky", "irradiance:800,100", "add --sun x,y,z"),
+        ("--sun", "0,1,0", "write =E behind it"),
         ("--sun-at", "48,11,noon=800", "noon"),
         ("--sun-at", "98,11,2026-06-21T12:00:00Z=800", "98"),
         ("--sun-at", "48,11,2026-06-21T00:00:00Z=800", "below the horizon"),

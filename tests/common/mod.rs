@@ -16,6 +16,7 @@ pub mod surface;
 pub mod textured;
 pub mod truth;
 pub mod view_factors;
+pub mod weather;
 
 use std::ops::ControlFlow;
 

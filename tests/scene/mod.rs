@@ -1,3 +1,4 @@
 mod lamp_sides;
 mod luminaires;
 mod sides;
+mod solar_irradiance;

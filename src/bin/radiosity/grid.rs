@@ -1,5 +1,6 @@
 //! `radiosity grid`: irradiance or illuminance on measuring grids, as a table and as pictures.
 
+mod annual;
 mod picture;
 mod table;
 
@@ -14,6 +15,7 @@ use radiosity::grid::{
 use radiosity::{Error, ErrorKind, Scene};
 
 use crate::args::{self, Output, Parsed, Stop, numbers, value};
+use crate::canvas::scale::Scale;
 use crate::light::{Light, LightOptions};
 use crate::progress;
 
@@ -26,7 +28,8 @@ const METRES: &str = "a length in metres";
 Bakes the scene and measures light at the points of grids. Writes STEM.grid.csv, a line a \
 point with its standard error, and a picture in false colours of each grid, STEM.grid.png or \
 STEM.grid-1.png and so on; prints mean, minimum, maximum and uniformity (minimum / mean). Points \
-inside solids are marked and do not count. Lengths are in metres.")]
+inside solids are marked and do not count. Lengths are in metres. With --weather the table has a \
+year of daylight: docs/daylight.md.")]
 pub struct Options {
     /// Scene, an OBJ file
     #[arg(value_name = "SCENE.obj")]
@@ -53,6 +56,18 @@ pub struct Options {
     /// 0.7152 of g and 0.0722 of b. Without it: irradiance, W/m², the mean of the channels
     #[arg(long)]
     photometric: bool,
+    /// Daylight of a year instead, lx, by the weather in this EPW file: autonomy, useful daylight
+    /// illuminance, exposure, and shares of the grid, sDA and ASE
+    #[arg(long, value_name = "FILE")]
+    weather: Option<PathBuf>,
+    /// Occupied hours of each day with --weather, local standard time
+    #[arg(long, value_name = "FROM,TO", default_value = "8,18", requires = "weather")]
+    #[arg(value_parser = hours)]
+    hours: [f64; 2],
+    /// Illuminance of daylight autonomy with --weather, lx
+    #[arg(long, value_name = "LX", default_value_t = 300.0, requires = "weather")]
+    #[arg(value_parser = illuminance)]
+    target: f64,
     #[command(flatten)]
     output: Output,
     #[command(flatten)]
@@ -66,6 +81,20 @@ fn plane(text: &str) -> Parsed<GridPlane> {
     Ok(GridPlane { origin: DVec3::new(a, b, c), edges })
 }
 
+/// Two times of the day.
+fn hours(text: &str) -> Parsed<[f64; 2]> {
+    let expected = "two hours of the day, the earlier first, from 0 to 24";
+    let [from, to] = numbers(expected)(text)?;
+    let is_fine = 0.0 <= from && from < to && to <= 24.0;
+    is_fine.then_some([from, to]).ok_or_else(|| args::give(expected))
+}
+
+fn illuminance(text: &str) -> Parsed<f64> {
+    let expected = "an illuminance above 0, lx";
+    let lux = value::<f64>(expected)(text)?;
+    (lux.is_finite() && lux > 0.0).then_some(lux).ok_or_else(|| args::give(expected))
+}
+
 /// A grid, and where it is, in words.
 type Placed = (String, MeasuringGrid);
 
@@ -73,10 +102,19 @@ impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
         self.output.name(self.scene.with_extension(""), &["csv", "png"])?;
-        self.light.reading.needs_up = self.planes.is_empty();
+        self.light.reading.needs_up = self.planes.is_empty() || self.weather.is_some();
+        if self.weather.is_some() {
+            self.light.reading.sky.be_of_weather()?;
+        }
+        if self.photometric {
+            self.light.reading.sky.be_photometric();
+        }
         let scene = self.light.scene(&self.scene)?;
         // Before the bake, which may take minutes.
         let grids = self.grids(&scene)?;
+        if let Some(weather) = &self.weather {
+            return annual::run(&self, weather, scene, &grids);
+        }
         let light = self.light.bake(scene)?;
         let mut measured = self.measure(&grids, &light)?.ok_or(Stop::Interrupted)?;
         let is_reached = self.correct(&mut measured, &light)?.ok_or(Stop::Interrupted)?;
@@ -205,14 +243,44 @@ impl Options {
                 );
             }
             let number = if grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
-            let (quantity, metre) = (self.quantity(), self.metre());
-            let picture = Picture { measured, statistics: &statistics, quantity, place, metre };
-            let png = picture.png().map_err(|found| {
-                Error::new(ErrorKind::File, "the picture of a grid", found, "please report it")
-            })?;
-            self.output.write(&format!("grid{number}.png"), &png)?;
+            let picture = self.picture(measured, &statistics, place);
+            self.write_picture(&picture, &number)?;
         }
         self.output.write("grid.csv", &table::csv(measured, self.quantity()))
+    }
+
+    fn picture<'a>(
+        &self,
+        measured: &'a MeasuredGrid,
+        statistics: &GridStatistics,
+        place: &str,
+    ) -> Picture<'a> {
+        let quantity = match self.quantity() {
+            Quantity::Irradiance => "Irradiance",
+            Quantity::Illuminance => "Illuminance",
+        };
+        let GridStatistics { mean, minimum, maximum, uniformity, .. } = *statistics;
+        let [mean, low, high] = [mean, minimum, maximum].map(three_digits);
+        let values = measured.measured(self.quantity()).map(|value| value.map(|[value, _]| value));
+        let unit = self.quantity().unit();
+        Picture {
+            grid: &measured.grid,
+            values: values.collect(),
+            title: format!("{quantity} in {unit}, {place}"),
+            line: format!(
+                "mean {mean}   minimum {low}   maximum {high}   uniformity {uniformity:.2}"
+            ),
+            unit,
+            scale: Scale::of_colours(minimum, maximum),
+            metre: self.metre(),
+        }
+    }
+
+    fn write_picture(&self, picture: &Picture, number: &str) -> Result<(), Error> {
+        let png = picture.png().map_err(|found| {
+            Error::new(ErrorKind::File, "the picture of a grid", found, "please report it")
+        })?;
+        self.output.write(&format!("grid{number}.png"), &png)
     }
 
     fn line(&self, name: &str, measured: &MeasuredGrid, statistics: &GridStatistics) -> String {

@@ -7,6 +7,7 @@
 //! radiosity merge         SCENE.…rows  the same, of their rows
 //! radiosity heat          SCENE.obj    radiative heat balance   -> CSV
 //! radiosity grid          SCENE.obj    light on measuring grids  -> CSV, PNG
+//! radiosity ugr           SCENE.obj    glare of observers        -> CSV
 //! radiosity probes        SCENE.obj    spherical harmonics       -> JSON, CSV
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
@@ -33,12 +34,15 @@ mod interrupt;
 mod light;
 mod light_map;
 mod luminaires;
+mod measured_sky;
 mod probes;
 mod progress;
 mod report;
 mod scene_options;
 mod sky;
+mod sun;
 mod trade_off;
+mod ugr;
 mod verify;
 mod view_factors;
 mod viewer_options;
@@ -66,6 +70,7 @@ enum Command {
     Heat(Box<heat::Options>),
     Grid(Box<grid::Options>),
     Probes(Box<probes::Options>),
+    Ugr(Box<ugr::Options>),
     TradeOff(Box<trade_off::Options>),
     Verify(Box<verify::Options>),
 }
@@ -88,6 +93,7 @@ fn main() -> ExitCode {
         Command::Heat(options) => options.run(),
         Command::Grid(options) => options.run(),
         Command::Probes(options) => options.run(),
+        Command::Ugr(options) => options.run(),
         Command::TradeOff(options) => options.run(),
         Command::Verify(options) => options.run(),
     };

@@ -1,26 +1,27 @@
 //! The light from outside, as the command line names it.
 
-use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use radiosity::glam::{DQuat, DVec3};
+use radiosity::glam::DVec3;
 use radiosity::io::read_radiance;
 use radiosity::scene::SkyDistribution;
 use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, Sun};
-use solar_positioning::{Location, SolarPositions, delta_t};
 
-use crate::args::{self, Parsed, give};
+use crate::args::{self, Parsed, Stop, give};
+use crate::measured_sky::MeasuredSky;
+use crate::sun::{GivenSun, SunPlace, sun_at, sun_towards};
 
 /// What `--sky` takes.
-const SKIES: &str =
-    "a radiance r,g,b, none, overcast, cie1 to cie15, perez:CLEARNESS,BRIGHTNESS, or a picture";
+const SKIES: &str = "a radiance r,g,b, none, overcast, cie1 to cie15, perez:CLEARNESS,BRIGHTNESS, \
+     irradiance:DNI,DHI, or a picture";
 
 /// The light from outside.
 #[derive(Args)]
 pub struct SkyOptions {
-    /// Sky: radiance r,g,b of a uniform one; none; above the horizon overcast, cie1 to cie15 or
-    /// perez:CLEARNESS,BRIGHTNESS; a picture FILE.exr or FILE.hdr [default: 1 if nothing emits]
+    /// Sky: radiance r,g,b; none; above the horizon overcast, cie1 to cie15,
+    /// perez:CLEARNESS,BRIGHTNESS or irradiance:DNI,DHI; a picture FILE.exr or FILE.hdr [default: 1
+    /// if nothing emits]
     #[arg(long = "sky", value_name = "SKY", value_parser = Kind::parse)]
     kind: Option<Kind>,
     /// Radiance of the sky at the zenith, or factor of a picture [default: 1]
@@ -35,29 +36,28 @@ pub struct SkyOptions {
     /// Direction away from the ground [default: +y or +z, by names, comments, lamps and geometry]
     #[arg(long, value_name = "x,y,z", value_parser = direction)]
     up: Option<DVec3>,
-    /// Direction of north, for --sun-at [default: -z; +y where +z is up]
+    /// Direction of north, for --sun-at and --weather [default: -z; +y where +z is up]
     #[arg(long, value_name = "x,y,z", hide = true, value_parser = direction)]
     north: Option<DVec3>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Kind {
+pub enum Kind {
     Uniform(Rgb),
     Overcast,
     Cie(u32),
     /// Clearness and brightness.
     Perez(f64, f64),
     Picture(PathBuf),
+    /// That of Perez and the sun, by their irradiance.
+    Irradiance(MeasuredSky),
 }
 
-/// Where the sun is, and its irradiance.
-type GivenSun = (SunPlace, Rgb);
-
-#[derive(Clone, Debug, PartialEq)]
-enum SunPlace {
-    Towards(DVec3),
-    /// Degrees north and east, and the time (RFC 3339).
-    At([f64; 2], String),
+/// Sky and sun as numbers.
+pub struct Resolved {
+    pub kind: Option<Kind>,
+    pub zenith: Rgb,
+    pub sun: Option<Sun>,
 }
 
 impl SkyOptions {
@@ -69,7 +69,7 @@ impl SkyOptions {
     /// Whether the light depends on which way is up.
     pub fn needs_up(&self) -> bool {
         !matches!(self.kind, None | Some(Kind::Uniform(_)))
-            || matches!(self.given_sun(), Some((SunPlace::At(..), _)))
+            || self.given_sun().is_some_and(GivenSun::is_by_time)
     }
 
     /// Whether it is the overcast sky, for which the daylight factor is defined (CIE S 011/E:2003,
@@ -81,6 +81,30 @@ impl SkyOptions {
     /// Whether nothing was said, so that a scene without light gets one that nobody asked for.
     pub fn is_default(&self) -> bool {
         self.kind.is_none() && self.given_sun().is_none()
+    }
+
+    /// Says that the weather of a year takes the place of all skies: the scene is read under one.
+    ///
+    /// # Errors
+    /// [`Stop::Usage`] where a sky or a sun is given.
+    pub fn be_of_weather(&mut self) -> Result<(), Stop> {
+        if !self.is_default() {
+            return Err(Stop::usage("--weather brings sky and sun: leave out --sky and --sun"));
+        }
+        self.kind = Some(Kind::Uniform(Rgb::ONE));
+        Ok(())
+    }
+
+    /// Direction of north, if given.
+    pub fn north(&self) -> Option<DVec3> {
+        self.north
+    }
+
+    /// Says that light is in lumens: irradiance by `--sky irradiance` is converted.
+    pub fn be_photometric(&mut self) {
+        if let Some(Kind::Irradiance(given)) = &mut self.kind {
+            given.is_photometric = true;
+        }
     }
 
     fn given_sun(&self) -> Option<&GivenSun> {
@@ -103,7 +127,8 @@ impl SkyOptions {
     /// horizon; those of reading a picture.
     pub fn over(&self, scene: Scene) -> Result<Scene, Error> {
         let is_even = matches!(self.kind, None | Some(Kind::Uniform(_)));
-        if is_even && self.zenith.is_some() {
+        let has_own = matches!(self.kind, Some(Kind::Irradiance(_)));
+        if (is_even || has_own) && self.zenith.is_some() {
             let found = "a radiance for a sky that differs by direction, and no such --sky".into();
             return Err(bad(
                 "zenith",
@@ -115,15 +140,14 @@ impl SkyOptions {
             return Ok(scene);
         }
         let up = scene.up();
-        let sun = self.sun(up)?;
+        let Resolved { kind, zenith, sun } = self.resolved(up)?;
         let towards_sun = sun.map_or(up, |sun| sun.direction);
-        let zenith = self.zenith.unwrap_or(Rgb::ONE);
         let spread = |distribution: Option<SkyDistribution>| {
             let words = || self.kind.as_ref().map_or_else(String::new, Kind::words);
             let wrong = || bad("sky", words(), SKIES);
             Sky::new(distribution.ok_or_else(wrong)?, zenith, up, towards_sun)
         };
-        let sky = match &self.kind {
+        let sky = match &kind {
             None => Sky::default(),
             Some(Kind::Uniform(radiance)) => (*radiance).into(),
             Some(Kind::Overcast) => spread(Some(SkyDistribution::OVERCAST))?,
@@ -137,6 +161,7 @@ impl SkyOptions {
                 pixels.iter_mut().for_each(|pixel| *pixel *= zenith);
                 Sky::picture(width, &pixels, up)?
             }
+            Some(Kind::Irradiance(_)) => Sky::default(),
         };
         scene.with_sky(match sun {
             Some(sun) => sky.with_sun(sun)?,
@@ -146,7 +171,7 @@ impl SkyOptions {
 
     /// What is odd about it over `scene`, which is under it.
     pub fn warning(&self, scene: &Scene) -> Option<String> {
-        let (Some((SunPlace::Towards(given), _)), Some(sun)) =
+        let (Some(GivenSun { place: SunPlace::Towards(given), .. }), Some(sun)) =
             (self.given_sun(), scene.sky().sun())
         else {
             return None;
@@ -164,47 +189,14 @@ impl SkyOptions {
         })
     }
 
-    fn sun(&self, up: DVec3) -> Result<Option<Sun>, Error> {
-        let Some((place, irradiance)) = self.given_sun().cloned() else { return Ok(None) };
-        let direction = match place {
-            SunPlace::Towards(direction) => direction,
-            SunPlace::At(place, time) => self.direction_at(place, &time, up)?,
+    /// Kind of the sky, radiance of its zenith and the sun, where `up` is up.
+    fn resolved(&self, up: DVec3) -> Result<Resolved, Error> {
+        let zenith = self.zenith.unwrap_or(Rgb::ONE);
+        let Some(Kind::Irradiance(given)) = self.kind else {
+            let sun = self.given_sun().map(|given| given.sun(up, self.north)).transpose()?;
+            return Ok(Resolved { kind: self.kind.clone(), zenith, sun });
         };
-        let unit = direction.try_normalize();
-        let unit = unit.ok_or_else(|| bad("sun", direction.to_string(), "give a direction"))?;
-        Ok(Some(Sun { direction: unit, irradiance }))
-    }
-
-    /// Towards the sun at a place and time, without refraction.
-    fn direction_at(
-        &self,
-        [latitude, longitude]: [f64; 2],
-        time: &str,
-        up: DVec3,
-    ) -> Result<DVec3, Error> {
-        let wrong = |found: String| {
-            bad("sun-at", found, "give degrees north and east, and a time with its offset from UTC")
-        };
-        let when = chrono::DateTime::parse_from_rfc3339(time);
-        let when = when.map_err(|e| wrong(format!("time {time}: {e}")))?;
-        let sun = delta_t::estimate_from_date_like(&when).and_then(|delta| {
-            let location = Location { latitude, longitude };
-            SolarPositions::new().at(&when, location, 0.0, delta, None)
-        });
-        let sun = sun.map_err(|e| wrong(e.to_string()))?;
-        let (elevation, azimuth) =
-            (FRAC_PI_2 - sun.zenith_angle().to_radians(), sun.azimuth().to_radians());
-        if elevation <= 0.0 {
-            let found = format!("the sun {:.1}° below the horizon", -elevation.to_degrees());
-            return Err(bad("sun-at", found, "give a time at which it is day"));
-        }
-        let up = up.normalize();
-        // Where −z is north for +y up.
-        let default = DQuat::from_rotation_arc(DVec3::Y, up) * DVec3::NEG_Z;
-        let north = self.north.unwrap_or(default).reject_from_normalized(up).try_normalize();
-        let north = north.ok_or_else(|| bad("north", "it along up".into(), "give another"))?;
-        let level = azimuth.cos() * north + azimuth.sin() * north.cross(up);
-        Ok(elevation.cos() * level + elevation.sin() * up)
+        given.resolved(self.given_sun(), up, self.north)
     }
 
     /// The same in words that give it again; none where a radiance says all.
@@ -212,13 +204,16 @@ impl SkyOptions {
         if scene.sky().uniform_radiance().is_some() && scene.sky().sun().is_none() {
             return None;
         }
-        let mut words = vec![self.kind.as_ref().map_or_else(|| "none".into(), Kind::words)];
-        if !matches!(self.kind, None | Some(Kind::Uniform(_))) {
-            words.push(format!("--zenith {}", list(self.zenith.unwrap_or(Rgb::ONE))));
+        let Resolved { kind, zenith, sun } = self.resolved(scene.up()).ok()?;
+        // A dark one says where a sky is bright.
+        let sun = scene.sky().sun().copied().or(sun);
+        let mut words = vec![kind.as_ref().map_or_else(|| "none".into(), Kind::words)];
+        if !matches!(kind, None | Some(Kind::Uniform(_))) {
+            words.push(format!("--zenith {}", list(zenith)));
             words.push(format!("--up {}", list(scene.up())));
         }
-        if let Some(Sun { direction, irradiance }) = scene.sky().sun() {
-            words.push(format!("--sun {}={}", list(*direction), list(*irradiance)));
+        if let Some(Sun { direction, irradiance }) = sun {
+            words.push(format!("--sun {}={}", list(direction), list(irradiance)));
         }
         Some(words.join(" "))
     }
@@ -238,6 +233,7 @@ impl Kind {
             Kind::Cie(number) => format!("cie{number}"),
             Kind::Perez(clearness, brightness) => format!("perez:{clearness},{brightness}"),
             Kind::Picture(path) => path.display().to_string(),
+            Kind::Irradiance(given) => given.words(),
         }
     }
 
@@ -255,6 +251,9 @@ impl Kind {
             let number = |text: &str| text.trim().parse().map_err(|_| wrong());
             return Ok(Kind::Perez(number(numbers.0)?, number(numbers.1)?));
         }
+        if let Some(numbers) = text.strip_prefix("irradiance:") {
+            return MeasuredSky::parse(numbers).map(Kind::Irradiance).ok_or_else(wrong);
+        }
         match text {
             "none" => Ok(Kind::Uniform(Rgb::ZERO)),
             "overcast" => Ok(Kind::Overcast),
@@ -264,35 +263,13 @@ impl Kind {
     }
 }
 
-fn bad(option: &str, found: String, remedy: &str) -> Error {
+pub fn bad(option: &str, found: String, remedy: &str) -> Error {
     Error::new(ErrorKind::Setting, format!("--{option}"), found, remedy)
 }
 
 /// `x,y,z`, not zero.
-fn direction(text: &str) -> Parsed<DVec3> {
+pub fn direction(text: &str) -> Parsed<DVec3> {
     let expected = "a direction x,y,z that is not zero";
     let direction = DVec3::from_array(args::numbers(expected)(text)?);
     direction.try_normalize().ok_or_else(|| give(expected))
-}
-
-/// `x,y,z=IRRADIANCE`.
-fn sun_towards(text: &str) -> Parsed<GivenSun> {
-    let expected = "x,y,z=IRRADIANCE: the direction towards the sun, and W/m²";
-    let (direction, irradiance) = text.split_once('=').ok_or_else(|| give(expected))?;
-    let direction = DVec3::from_array(args::numbers(expected)(direction)?);
-    let irradiance = args::rgb(irradiance).map_err(|_| give(expected))?;
-    Ok((SunPlace::Towards(direction), irradiance))
-}
-
-/// `LATITUDE,LONGITUDE,TIME=IRRADIANCE`.
-fn sun_at(text: &str) -> Parsed<GivenSun> {
-    let sun = || {
-        let (at, irradiance) = text.split_once('=')?;
-        let [latitude, longitude, time] = at.split(',').collect::<Vec<_>>().try_into().ok()?;
-        let place = [latitude.trim().parse().ok()?, longitude.trim().parse().ok()?];
-        Some((SunPlace::At(place, time.trim().into()), args::rgb(irradiance).ok()?))
-    };
-    let expected = "LATITUDE,LONGITUDE,TIME=IRRADIANCE, as in \
-                    48.1,11.6,2026-06-21T12:00:00+02:00=800";
-    sun().ok_or_else(|| give(expected))
 }

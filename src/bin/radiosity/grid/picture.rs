@@ -3,7 +3,7 @@
 use plotters::prelude::RGBColor;
 use plotters::style::text_anchor::HPos;
 use radiosity::glam::DVec3;
-use radiosity::grid::{GridStatistics, MeasuredGrid, Quantity};
+use radiosity::grid::MeasuringGrid;
 
 use crate::canvas::scale::Scale;
 use crate::canvas::{self, BLACK, Canvas, Drawn, Font, GREY, Side};
@@ -14,11 +14,14 @@ const TOP: f64 = 92.0;
 
 /// A grid as it is drawn.
 pub struct Picture<'a> {
-    pub measured: &'a MeasuredGrid,
-    pub statistics: &'a GridStatistics,
-    pub quantity: Quantity,
-    /// What is said in the title.
-    pub place: &'a str,
+    pub grid: &'a MeasuringGrid,
+    /// Of its points, in their order; none where there is none, or it is inside of a solid.
+    pub values: Vec<Option<f64>>,
+    pub title: String,
+    /// Below the title.
+    pub line: String,
+    pub unit: &'a str,
+    pub scale: Scale,
     /// Length of a metre in the scene's unit.
     pub metre: f64,
 }
@@ -26,7 +29,7 @@ pub struct Picture<'a> {
 impl Picture<'_> {
     /// The picture as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, String> {
-        let metres = self.measured.grid.plane.edges.map(|edge: DVec3| edge.length() / self.metre);
+        let metres = self.grid.plane.edges.map(|edge: DVec3| edge.length() / self.metre);
         let longest = metres[0].max(metres[1]);
         let map = metres.map(|edge| (720.0 * edge / longest).max(120.0).round());
         // At least as wide as the lines of text.
@@ -37,26 +40,16 @@ impl Picture<'_> {
 
     /// Draws on a `canvas`, with the map of this size in pixels and in metres.
     fn draw(&self, canvas: &Canvas, [width, height]: [f64; 2], metres: [f64; 2]) -> Drawn {
-        let quantity = match self.quantity {
-            Quantity::Irradiance => "Irradiance",
-            Quantity::Illuminance => "Illuminance",
-        };
-        let title = format!("{quantity} in {}, {}", self.quantity.unit(), self.place);
-        canvas.text(&title, (LEFT, 24.0), Font::new(20.0, BLACK).bold())?;
-        let GridStatistics { mean, minimum, maximum, uniformity, .. } = *self.statistics;
-        let [mean, low, high] = [mean, minimum, maximum].map(three_digits);
-        let line =
-            format!("mean {mean}   minimum {low}   maximum {high}   uniformity {uniformity:.2}");
-        canvas.text(&line, (LEFT, 52.0), Font::new(16.0, GREY))?;
-
-        let scale = Scale::of_colours(minimum, maximum);
+        canvas.text(&self.title, (LEFT, 24.0), Font::new(20.0, BLACK).bold())?;
+        canvas.text(&self.line, (LEFT, 52.0), Font::new(16.0, GREY))?;
+        let scale = &self.scale;
         let (right, bottom) = (LEFT + width, TOP + height);
-        let [columns, rows] = self.measured.grid.counts;
+        let [columns, rows] = self.grid.counts;
         let x = |column: usize| LEFT + width * column as f64 / columns as f64;
         let y = |row: usize| bottom - height * row as f64 / rows as f64;
-        for (k, value) in self.measured.measured(self.quantity).enumerate() {
-            let colour = value
-                .map_or(RGBColor(226, 226, 226), |[value, _]| Scale::colour(scale.share(value)));
+        for (k, value) in self.values.iter().enumerate() {
+            let colour =
+                value.map_or(RGBColor(226, 226, 226), |value| Scale::colour(scale.share(value)));
             let (column, row) = (k % columns, k / columns);
             canvas.fill([x(column), y(row + 1), x(column + 1), y(row)], colour)?;
         }
@@ -74,8 +67,8 @@ impl Picture<'_> {
             let place = [left, at(high), beside, at(low)];
             canvas.fill(place, Scale::colour((low + high) / 2.0))?;
         }
-        canvas.axis(&scale, [(beside, bottom), (beside, TOP)], Side::Right, 0.0)?;
-        canvas.text(self.quantity.unit(), (left, TOP - 16.0), Font::new(14.0, BLACK).bold())
+        canvas.axis(scale, [(beside, bottom), (beside, TOP)], Side::Right, 0.0)?;
+        canvas.text(self.unit, (left, TOP - 16.0), Font::new(14.0, BLACK).bold())
     }
 }
 
