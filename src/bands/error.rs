@@ -14,7 +14,8 @@ pub struct BandError {
     /// Upper bound of the omitted light of further bounces.
     pub remainder: f64,
     /// Estimated error of the bake in red, green and blue, mainly of its mesh, which is also that
-    /// of the bands. It does not include light that only bands have.
+    /// of the bands. It is one figure for the whole scene, so dark rooms may be further off, and it
+    /// does not include light that only bands have.
     pub of_bake: f64,
 }
 

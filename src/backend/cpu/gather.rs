@@ -35,7 +35,7 @@ use direct_light::DirectLight;
 use doubled::{Doubled, RaySums};
 use near_field::{NearField, NearLight, NearRay};
 pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
-use scene_rays::SceneRays;
+use scene_rays::{SceneRays, shadow_rays};
 use wide_light::WideLight;
 
 /// Gathers by casting cosine-distributed rays, and rays to points on each light.
@@ -107,7 +107,9 @@ impl RayGather {
     ) -> [IrradianceSample; FIELDS] {
         let max_bound = self.noise / BOUNDS_OF_NOISE;
         let direct_light = DirectLight::new(&self.scene, self.min_rays, point, max_bound);
-        let mut direct = Doubled::new(self.shadow_rays(), |range| direct_light.cast(range));
+        let mut direct = Doubled::new([self.min_rays, self.max_rays].map(shadow_rays), |range| {
+            direct_light.cast(range)
+        });
         let trace = |range| self.trace(fields, point, &direct_light, range);
         let mut hemisphere = Doubled::new([self.min_rays, self.max_rays], trace);
         let LuminaireIrradiance { irradiance: of_luminaires, error: of_least } =
@@ -132,11 +134,6 @@ impl RayGather {
         let noise = noise.hypot(direct_light.error()).hypot(of_least);
         let directional = direct.sums().of_sun() + of_luminaires;
         rays.samples(count, [direct.mean() + of_luminaires, directional], noise)
-    }
-
-    /// Minimum and maximum number of shadow rays to each light.
-    fn shadow_rays(&self) -> [u32; 2] {
-        [self.min_rays, self.max_rays].map(|rays| (rays / RAYS_PER_SHADOW_RAY).max(2))
     }
 
     /// Irradiance of luminaires at `point`, W/m² per channel.

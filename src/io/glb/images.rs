@@ -81,9 +81,9 @@ impl Image {
         let colour = |texel: Rgb| {
             let scaled = |mean: Rgb| shown.colours.map_or(mean, |map| map.scaled(texel, mean));
             tone.linear(if shown.emits {
-                scaled(material.exitance) + material.reflectance * irradiance
+                scaled(material.exitance) + material.albedo() * irradiance
             } else {
-                material.exitance + scaled(material.reflectance) * irradiance
+                material.exitance + scaled(material.albedo()) * irradiance
             })
         };
         let texels = Texels::new(shown);
@@ -161,7 +161,7 @@ pub(super) fn png(
 
 /// Radiosity of a surface with the means of its material's textures everywhere, W/m².
 pub(super) fn mean_radiosity(material: &Material, irradiance: Rgb) -> Rgb {
-    material.exitance + material.reflectance * irradiance
+    material.exitance + material.albedo() * irradiance
 }
 
 /// The irradiance whose mean radiosity is shown with the median brightness, among lit vertices; if
@@ -175,4 +175,16 @@ fn median(mut irradiances: Vec<Rgb>, material: &Material, tone: &ToneCurve) -> R
     let middle = irradiances.len() / 2;
     let order = |a: &Rgb, b: &Rgb| brightness(a).total_cmp(&brightness(b));
     *irradiances.select_nth_unstable_by(middle, order).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_that_comes_through_is_in_the_mean() {
+        let [transmittance, exitance] = [0.25, 3.0].map(Rgb::splat);
+        let leaf = Material { transmittance, exitance, ..Material::grey("leaf", 0.5) };
+        assert_eq!(mean_radiosity(&leaf, Rgb::splat(8.0)), Rgb::splat(3.0 + 0.75 * 8.0));
+    }
 }

@@ -4,8 +4,10 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::doubled::RaySums;
-use super::scene_rays::SceneRays;
+use super::scene_rays::{SceneRays, shadow_rays};
 use super::wide_light::WideLight;
 use crate::gather::GatherPoint;
 use crate::gather::light_samples::{LightRay, LightSample, LightSamples, LightSums};
@@ -59,7 +61,7 @@ impl<'a> DirectLight<'a> {
             !is_wide
         });
         let rotation = rays.rotations.at(point.position, point.near);
-        let first_half = min_shadow_rays(min_rays) / 2;
+        let first_half = shadow_rays(min_rays) / 2;
         let lights = LightSamples::new(&rays.lights, cut.nodes, point, rotation, first_half);
         let sun = rays.scene.sky().sun();
         DirectLight { scene: rays, point, lights, wide, sun, rotation, error: cut.error }
@@ -85,7 +87,7 @@ impl<'a> DirectLight<'a> {
     pub fn add_to_wide(
         &self,
         visible: &mut [Visible],
-        direction: glam::DVec3,
+        direction: DVec3,
         hit: Option<Hit>,
         passed: impl Fn(f64) -> Rgb,
     ) {
@@ -153,11 +155,6 @@ impl<'a> DirectLight<'a> {
         }
         rays.panes.transmittance(point.position, to, reach)
     }
-}
-
-/// Minimum number of rays to lights from a point that casts at least `rays` over the hemisphere.
-fn min_shadow_rays(rays: u32) -> u32 {
-    (rays / super::RAYS_PER_SHADOW_RAY).max(2)
 }
 
 impl ShadowRays<'_> {

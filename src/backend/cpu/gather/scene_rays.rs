@@ -11,8 +11,13 @@ use crate::scene::{Luminaire, Scene};
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::RayScene;
 
-/// Rays over the hemisphere per shadow ray to each light. Plain choice; no recorded measurement.
+/// Rays over the hemisphere per shadow ray to lights. Plain choice; no recorded measurement.
 pub(crate) const RAYS_PER_SHADOW_RAY: u32 = 4;
+
+/// Number of rays to lights from a point that casts `rays` over the hemisphere.
+pub(super) fn shadow_rays(rays: u32) -> u32 {
+    (rays / RAYS_PER_SHADOW_RAY).max(2)
+}
 
 /// Surfaces, clear panes and lights of a scene, and the rotation of rays at each of its points.
 #[derive(Debug)]
