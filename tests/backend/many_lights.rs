@@ -1,11 +1,13 @@
 //! Hundreds of lights: what they add up to, with and without a wall before half of them.
 
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
 use radiosity::gather::{Gather, GatherPoint, RadiosityField};
 use radiosity::scene::{IntensityDistribution, Luminaire};
+use radiosity::verify::{PathTracer, Reflected};
 use radiosity::{Backend, Material, Mesh, Rgb, Scene};
 
 use crate::common::scenes::{Quad, facing_down, facing_up, lamp, paint, quads};
@@ -113,4 +115,15 @@ fn four_hundred_luminaires_add_up_to_their_closed_forms() {
     check(open, off(lit(&walled), truth([false, true])));
     // The flux of I cos γ is π.
     assert!((distribution.flux() / PI - 1.0).abs() < 1e-4);
+    // Paths choose among all: half of what arrives is reflected, once.
+    let scene = lit(&[floor()]);
+    let tracer = PathTracer::new(&scene);
+    let at = DVec3::new(0.3, 0.7, 0.0);
+    let point = tracer.locate(at, DVec3::Z).unwrap();
+    let Reflected { radiosity, standard_error } =
+        tracer.reflected(&[point], 16_384, 1, |_, _| ControlFlow::Continue(()))[0];
+    let (off, expected) =
+        ((radiosity - 0.5 * truth([true; 2])(at)).x, 0.5 * truth([true; 2])(at).x);
+    println!("paths off by {off}, standard error {}, of {expected}", standard_error.x);
+    assert!(off.abs() < 4.0 * standard_error.x && standard_error.x < 0.01 * expected, "{off}");
 }
