@@ -193,8 +193,8 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
         Some(LightRay { weight: nodes[node].irradiance / width, ..ray })
     }
 
-    /// Casts the rays of `range` to the strata that are `chosen` by their number: `passed` gives the
-    /// share of a sample's light that arrives.
+    /// Casts the rays of `range` to the strata that are `chosen` by their number: `passed` gives
+    /// the share of a sample's light that arrives.
     pub fn cast(
         &self,
         range: Range<u32>,

@@ -31,8 +31,9 @@ use crate::scene::Rgb;
 use cone::Cone;
 use far_field::FarField;
 
-/// Largest bound of a node's error as a share of the irradiance of all lights. Of a field of 400 lamps
-/// all errors add up to 0.1 %, of one of 400 luminaires to 0.3 % (`tests/backend/many_lights.rs`).
+/// Largest bound of a node's error as a share of the irradiance of all lights. Of a field of 400
+/// lamps all errors add up to 0.1 %, of one of 400 luminaires to 0.3 %
+/// (`tests/backend/many_lights.rs`).
 const MAX_BOUND: f64 = 3e-3;
 
 /// Nodes that are opened in any case: so few lights are exact, at a price that nobody notices.
@@ -54,7 +55,8 @@ pub(crate) trait Leaf: Sync {
     /// The mean of what emits, scene unit, and the mean of squares about it.
     fn middle(&self) -> (DVec3, DMat3);
 
-    /// Directions of its normals: it sends nothing to where the angle to all of them is 90° or more.
+    /// Directions of its normals: it sends nothing to where the angle to all of them is 90° or
+    /// more.
     fn cone(&self) -> Option<Cone>;
 
     /// Times a direction in front of all normals: the intensity there, W/sr per channel; none where
@@ -131,8 +133,8 @@ pub(crate) struct Cut {
 }
 
 impl<L: Leaf> LightTree<L> {
-    /// A tree of `leaves`, which light the surfaces of a scene by `mean` on average, W/m² summed over
-    /// the channels.
+    /// A tree of `leaves`, which light the surfaces of a scene by `mean` on average, W/m² summed
+    /// over the channels.
     pub fn new(leaves: Vec<L>, mean: f64) -> LightTree<L> {
         let mut nodes = vec![Node::EMPTY; (2 * leaves.len()).saturating_sub(1)];
         let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
@@ -171,8 +173,8 @@ impl<L: Leaf> LightTree<L> {
         (&self.leaves[k], left, own / all)
     }
 
-    /// Nodes whose irradiance at `point` is off by at most the share `max_bound` of that of all each,
-    /// or by 0.3 %.
+    /// Nodes whose irradiance at `point` is off by at most the share `max_bound` of that of all
+    /// each, or by 0.3 %.
     pub fn cut(&self, point: &GatherPoint, max_bound: f64) -> Cut {
         let share = max_bound.min(MAX_BOUND);
         let (mut open, mut nodes) = (BinaryHeap::new(), vec![]);
@@ -290,11 +292,11 @@ impl Node {
         right: 0,
     };
 
-    /// Error of intensity times cosine, W/sr, of a node that is `size` times its distance in radius,
-    /// whether or not all of its normals are `facing` the point. In the Taylor series of
-    /// cos θ cos θ′ / d² about the middle, terms of the first order in `size` come from normals that
-    /// differ along the node, by the sine of their half-angle at most. Of nodes of closed, open,
-    /// stretched and hollow shapes, at distances of 1.5 to 60 radii, 99 % are off by less.
+    /// Error of intensity times cosine, W/sr, of a node that is `size` times its distance in
+    /// radius, whether or not all of its normals are `facing` the point. In the Taylor series of
+    /// cos θ cos θ′ / d² about the middle, terms of the first order in `size` come from normals
+    /// that differ along the node, by the sine of their half-angle at most. Of nodes of closed,
+    /// open, stretched and hollow shapes, at distances of 1.5 to 60 radii, 99 % are off by less.
     fn error(&self, size: f64, is_facing: bool) -> f64 {
         let [spread, strength, of_table] = match (&self.far_field, &self.cone) {
             (_, Some(cone)) if is_facing => [cone.sine(), self.peak, 0.0],

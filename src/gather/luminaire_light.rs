@@ -48,8 +48,8 @@ pub(crate) struct LuminaireIrradiance {
 /// sends is then 1e-7 of it at most.
 const POINT_DISTANCE: f64 = 1e3;
 
-/// Distance of an opening in units of its size from which a rule of degree 3 will do: of a disc that
-/// faces the point, and has the radius a at the distance d, its error is (a/d)⁴/4 = 4e-6.
+/// Distance of an opening in units of its size from which a rule of degree 3 will do: of a disc
+/// that faces the point, and has the radius a at the distance d, its error is (a/d)⁴/4 = 4e-6.
 const FAR: f64 = 8.0;
 
 /// Rays to an opening: initially, and in total where some of them are occluded. A penumbra then has
@@ -59,8 +59,8 @@ const RAYS: [u32; 2] = [16, 256];
 /// Luminaires that have that many rays on average; more share the rays of these.
 const LUMINAIRES_OF_RAYS: u32 = 4;
 
-/// Bound of the error of luminaires as a share of the irradiance of all, where shadows are looked for
-/// by what arrives: differences of a hundred errors are below 0.2 % then.
+/// Bound of the error of luminaires as a share of the irradiance of all, where shadows are looked
+/// for by what arrives: differences of a hundred errors are below 0.2 % then.
 pub(super) const SMALL_BOUND: f64 = 1e-3;
 
 /// Rays to luminaires that share rays, over those cast initially, where some of them are hidden: at
@@ -126,8 +126,8 @@ impl SampledLeaf for Luminaire {
 }
 
 impl LuminaireLight<'_> {
-    /// Irradiance at `point`; that of no luminaire is off by more than the share `max_bound` of that
-    /// of all.
+    /// Irradiance at `point`; that of no luminaire is off by more than the share `max_bound` of
+    /// that of all.
     pub fn irradiance(&self, point: &GatherPoint, max_bound: f64) -> LuminaireIrradiance {
         let Cut { nodes, error } = self.tree.cut(point, max_bound);
         if nodes.is_empty() {

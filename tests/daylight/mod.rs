@@ -56,8 +56,8 @@ fn open_ground() -> (Scene, GatherPoint) {
 }
 
 fn near(found: Estimate, truth: f64) {
-    // Four standard errors; the rounding of sums in 32 bits, and the mean cosine over the rim of the
-    // sun, half of the square of its radius, 1.1e-5, below that of its middle.
+    // Four standard errors; the rounding of sums in 32 bits, and the mean cosine over the rim of
+    // the sun, half of the square of its radius, 1.1e-5, below that of its middle.
     let within = 4.0 * found.error + 2e-5 * truth;
     assert!((found.value - truth).abs() <= within, "{found:?} {truth}");
 }

@@ -34,6 +34,7 @@ use crate::visibility::ray_scene::Hit;
 use direct_light::DirectLight;
 use doubled::{Doubled, RaySums};
 use near_field::{NearField, NearLight, NearRay};
+#[cfg(feature = "gpu")]
 pub(crate) use scene_rays::RAYS_PER_SHADOW_RAY;
 use scene_rays::{SceneRays, shadow_rays};
 use wide_light::WideLight;
