@@ -91,11 +91,12 @@ fn add_gathered(
 fn add_luminaires(mesh: &Mesh, elements: &[usize], irradiance: &mut [Rgb], proceed: Proceed) {
     let Some(light) = DirectionalLight::of_scene(mesh.shared_scene()) else { return };
     let above = SurfaceOffset::new(mesh.scene());
+    let luminaires: Vec<&Luminaire> = mesh.scene().luminaires().iter().collect();
     let (mut remaining, mut batches) = (elements, BatchSizer::new(64));
     while !remaining.is_empty() && proceed().is_continue() {
         batches.next(&mut remaining, |batch| {
             let of_element = |&e: &usize| {
-                let parts = parts(&above, mesh, mesh.element(e));
+                let parts = parts(&above, mesh, mesh.element(e), &luminaires);
                 let sum = parts.into_iter().map(|p| p.share * light.of_luminaires(&p.point)).sum();
                 (e, sum)
             };
@@ -113,12 +114,11 @@ struct Part {
     share: f64,
 }
 
-/// The parts of `node` of `mesh`.
-fn parts(above: &SurfaceOffset, mesh: &Mesh, node: NodeId) -> Vec<Part> {
+/// The parts of `node` of `mesh`, lit by `luminaires`.
+fn parts(above: &SurfaceOffset, mesh: &Mesh, node: NodeId, luminaires: &[&Luminaire]) -> Vec<Part> {
     let (corners, normal) = (mesh.corners(node), mesh.normal(node));
-    let luminaires: Vec<&Luminaire> = mesh.scene().luminaires().iter().collect();
     let mut middles = vec![];
-    cut(corners, normal, 0, &luminaires, &mut middles);
+    cut(corners, normal, 0, luminaires, &mut middles);
     if let [_] = middles[..] {
         return vec![Part { point: above.above_element(mesh, node), share: 1.0 }];
     }

@@ -87,10 +87,11 @@ impl DaylightYear {
             return Err(bad("no occupied hour", "give hours that the weather is known of"));
         }
         let patches = Patches::new(up);
-        let lit: Vec<LitHour> =
-            hours.par_iter().filter_map(|hour| LitHour::new(hour, &patches, up)).collect();
+        let directions = patches.directions();
+        let lit = |hour| LitHour::new(hour, &patches, &directions, up);
+        let lit: Vec<LitHour> = hours.par_iter().filter_map(lit).collect();
         let mut solid_angles = vec![0.0; PATCHES];
-        patches.directions().iter().for_each(|d| solid_angles[d.patch] += d.solid_angle);
+        directions.iter().for_each(|d| solid_angles[d.patch] += d.solid_angle);
         let suns = SunPatch::all(&lit);
         Ok(DaylightYear { patches, hours: lit, solid_angles, suns, occupied })
     }
@@ -121,7 +122,12 @@ impl DaylightYear {
 
 impl LitHour {
     /// None in the dark.
-    fn new(hour: &DaylightHour, patches: &Patches, up: DVec3) -> Option<LitHour> {
+    fn new(
+        hour: &DaylightHour,
+        patches: &Patches,
+        directions: &[SkyDirection],
+        up: DVec3,
+    ) -> Option<LitHour> {
         let DaylightHour { light, towards_sun, dew_point, duration, is_occupied } = *hour;
         let efficacy = light.efficacy(dew_point);
         let illuminance = light.direct_normal * efficacy.direct;
@@ -135,7 +141,7 @@ impl LitHour {
         let models = [light.distribution(), SkyDistribution::cie(5)];
         // The second where the zenith of the first is black, and nothing relative to it.
         let skies = models.into_iter().flatten().take(if diffuse > 0.0 { 2 } else { 0 });
-        let mut skies = skies.map(|model| relative_sky(model, towards_sun, patches, up));
+        let mut skies = skies.map(|model| relative_sky(model, towards_sun, directions, up));
         let sky = skies.find(|sky| sky.level > 0.0);
         if sky.is_none() && sun.is_none() {
             return None;
@@ -161,12 +167,12 @@ struct RelativeSky {
 fn relative_sky(
     model: SkyDistribution,
     towards_sun: DVec3,
-    patches: &Patches,
+    directions: &[SkyDirection],
     up: DVec3,
 ) -> RelativeSky {
     let relative = model.relative_to_zenith(up.dot(towards_sun));
     let (mut sums, mut weights, mut level) = (vec![0.0; PATCHES], vec![0.0; PATCHES], 0.0);
-    for SkyDirection { patch, direction, solid_angle } in patches.directions() {
+    for &SkyDirection { patch, direction, solid_angle } in directions {
         let cosine = direction.dot(up);
         let flux = relative(cosine, direction.dot(towards_sun)) * solid_angle;
         sums[patch] += flux;

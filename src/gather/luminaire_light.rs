@@ -121,7 +121,7 @@ impl SampledLeaf for Luminaire {
     }
 
     fn is_point(&self, point: &GatherPoint) -> bool {
-        self.extent() * POINT_DISTANCE <= self.position.distance(point.position)
+        is_point_from(self, point.position)
     }
 }
 
@@ -173,8 +173,7 @@ impl LuminaireLight<'_> {
         if unoccluded == 0.0 {
             return Rgb::ZERO;
         }
-        let distance = luminaire.position.distance(position);
-        let seen = match luminaire.extent() * POINT_DISTANCE <= distance {
+        let seen = match is_point_from(luminaire, position) {
             true => self.passed(point, luminaire.position),
             false => self.seen_share(luminaire, point),
         };
@@ -217,6 +216,11 @@ impl LuminaireLight<'_> {
     }
 }
 
+/// Whether the opening is a point as seen from `at`.
+fn is_point_from(luminaire: &Luminaire, at: DVec3) -> bool {
+    luminaire.extent() * POINT_DISTANCE <= luminaire.position.distance(at)
+}
+
 /// Irradiance at `at` with this unit `normal` where nothing hides the opening, in units of the
 /// scale.
 ///
@@ -225,7 +229,7 @@ impl LuminaireLight<'_> {
 /// panels that are half as long as the opening is far, or as 16, with three Gauss points each:
 /// where intensity is smooth the error is about 8⁻⁶ = 4e-6 (see [`crate::geometry::quadrature`]).
 fn unoccluded(luminaire: &Luminaire, at: DVec3, normal: DVec3) -> f64 {
-    if luminaire.extent() * POINT_DISTANCE <= luminaire.position.distance(at) {
+    if is_point_from(luminaire, at) {
         return Luminaire::irradiance(luminaire, luminaire.position, at, normal);
     }
     let distance = luminaire.distance_to_box(at);
