@@ -25,6 +25,7 @@ pub(crate) mod light_samples;
 pub(crate) mod light_tree;
 pub(crate) mod lights;
 pub(crate) mod luminaire_light;
+pub(crate) mod near_surface;
 pub(crate) mod point_irradiance;
 pub(crate) mod point_row;
 mod progress;
@@ -84,6 +85,9 @@ pub struct IrradianceSample {
     pub backface: f64,
     /// Mean of 1/distance over the hemisphere, 1/scene unit; directions that see nothing count 0.
     pub inverse_distance: f64,
+    /// Whether paths, in place of the field, have the light of near surfaces: those that are nearer
+    /// than their element is wide.
+    pub near_paths: bool,
 }
 
 /// A known radiosity field: what every point on the front of the scene reflects, interpolated

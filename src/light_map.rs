@@ -1,9 +1,9 @@
 //! Light maps: the irradiance of all surfaces of a scene in one texture.
 //!
 //! ```text
-//!   Scene ──► Atlas ──────► texels ─────► gather ───► weld seams ──► dilate ──► LightMap
-//!             texture       that surfaces  irradiance  where charts   buried and
-//!             coordinates   are seen with  of each     meet in space  empty texels
+//!   Scene ─► Atlas ──────► texels ───────► gather ───► correct ─► weld seams ──► dilate ─► map
+//!            texture       that surfaces   irradiance  by paths   where charts   buried and
+//!            coordinates   are seen with   of each                meet in space  empty texels
 //! ```
 //!
 //! Renderers interpolate a surface point from the four texels around its texture coordinates. So
@@ -15,6 +15,7 @@
 //! ([`Scene::resolve_sides`](crate::Scene::resolve_sides)), and so its own texels.
 
 mod atlas;
+mod correction;
 mod coverage;
 mod dilation;
 mod footprint;

@@ -25,7 +25,9 @@
 //! good, τ is small and few paths do; where it is not, w goes to 1 and the value to that of the
 //! paths alone. Points whose error is too large get twice as many paths until it is not.
 
+mod nested_cells;
 mod shrinkage;
+mod surface;
 
 use std::ops::ControlFlow;
 
@@ -33,6 +35,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
+use crate::gather::near_surface::is_near;
+use crate::gather::two_sided::TwoSidedPoint;
 use crate::gather::{GatherPoint, GatheredMesh, PointIrradiance, RadiosityField};
 use crate::light::PathTracer;
 use crate::progress::BatchSizer;
@@ -41,6 +45,7 @@ use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 use shrinkage::{Missed, Shrinkage};
+pub(crate) use surface::{Place, missed_light};
 
 /// Paths of all points in the first round: bring what they miss in common to 1 % of itself where
 /// paths scatter by 2.5 times their mean.
@@ -245,10 +250,34 @@ impl MissingLight<'_> {
 
     /// Irradiance that is missed at `point`, by path number `path`, W/m².
     fn irradiance(&self, point: &GatherPoint, path: usize) -> Rgb {
+        self.irradiance_past(point, false, path)
+    }
+
+    /// The same past near surfaces where `near_paths` have their light.
+    fn irradiance_past(&self, point: &GatherPoint, near_paths: bool, path: usize) -> Rgb {
         let GatherPoint { position, normal, near } = *point;
         let mut rng = numbers_of(position, normal, path);
         let direction = cosine_direction(normal, [rng.f64(), rng.f64()]);
-        self.radiosity(position, direction, near, &mut rng)
+        let is_known = |hit: &Hit| !near_paths || !is_near(self.field.mesh, hit);
+        let known = |hit: &Hit| self.field.reflected_at(hit.triangle, hit.u, hit.v);
+        self.tracer.missed([position, direction], near, is_known, known, &mut rng)
+    }
+
+    /// Irradiance that is missed at a point of a surface, by path number `path`, W/m². With
+    /// `near_paths` what near surfaces reflect is not the field's, as in
+    /// [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
+    pub fn irradiance_two_sided(
+        &self,
+        point: &TwoSidedPoint,
+        near_paths: bool,
+        path: usize,
+    ) -> Rgb {
+        let [own, other] = point.shares();
+        let front = own * self.irradiance_past(&point.point, near_paths, path);
+        if other == Rgb::ZERO {
+            return front;
+        }
+        front + other * self.irradiance_past(&point.other_side(), near_paths, path)
     }
 
     /// What is missed of the radiosity that is seen from `position` along unit `direction`, further
@@ -261,7 +290,7 @@ impl MissingLight<'_> {
         rng: &mut fastrand::Rng,
     ) -> Rgb {
         let known = |hit: &Hit| self.field.reflected_at(hit.triangle, hit.u, hit.v);
-        self.tracer.missed(position, direction, near, known, rng)
+        self.tracer.missed([position, direction], near, |_| true, known, rng)
     }
 }
 

@@ -48,8 +48,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("bands", "accuracy backend bake error gather linear mesh scene vertex"),
     (
         "light_map",
-        "accuracy backend bake error gather geometry mesh progress sampling scene vertex \
-         visibility",
+        "accuracy backend bake error gather geometry mesh path_correction progress sampling scene \
+         vertex visibility",
     ),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];

@@ -125,6 +125,7 @@ fn mixed(front: IrradianceSample, back: IrradianceSample, share: Rgb) -> Irradia
             _ => None,
         },
         noise: ((1.0 - mean) * front.noise).hypot(mean * back.noise),
+        near_paths: front.near_paths || back.near_paths,
         ..front
     }
 }

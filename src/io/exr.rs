@@ -22,8 +22,9 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
     write(path.as_ref(), size, channels.into())
 }
 
-/// Writes the irradiance of a light map, W/m², as a 32-bit float OpenEXR. Its channels are R, G, B
-/// and `coverage`, 1 where a texel gathered and 0 where it is empty or filled from its neighbours.
+/// Writes the irradiance of a light map, W/m², as a 32-bit float OpenEXR. Its channels are R, G, B,
+/// `coverage`, 1 where a texel gathered and 0 where it is empty or filled from its neighbours, and
+/// `error`, the standard error of a texel that gathered, W/m², a length over R, G and B.
 /// At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
 ///
 /// # Errors
@@ -33,7 +34,8 @@ pub fn write_light_map_exr(path: impl AsRef<Path>, map: &LightMap) -> Result<(),
     let size = [map.atlas.width(), map.atlas.height()];
     let [r, g, b] = rgb(path.as_ref(), size, &map.irradiance, ["irradiance", "W/m²"])?;
     let coverage = map.gathered.iter().map(|&gathered| f32::from(u8::from(gathered))).collect();
-    write(path.as_ref(), size, vec![r, g, b, ("coverage", coverage)])
+    let error = map.standard_error.iter().map(|&error| error as f32).collect();
+    write(path.as_ref(), size, vec![r, g, b, ("coverage", coverage), ("error", error)])
 }
 
 /// Writes the radiosity of a light map, W/m², as a 32-bit float OpenEXR with channels R, G, B:

@@ -232,12 +232,13 @@ impl<'a> PathTracer<'a> {
 
     /// What the surface that is seen from `position` along unit `direction`, further than `near`,
     /// reflects beyond what is `known` of it: radiosity by one path, as it arrives, W/m², unbiased.
-    /// Light that it emits is not in it.
+    /// Where nothing `is_known` of it, what is missed of the first surface on the path of which
+    /// something is. Light that surfaces emit is not in it.
     pub(crate) fn missed(
         &self,
-        position: DVec3,
-        direction: DVec3,
+        [position, direction]: [DVec3; 2],
         near: f64,
+        is_known: impl Fn(&Hit) -> bool,
         known: impl Fn(&Hit) -> Rgb,
         rng: &mut Rng,
     ) -> Rgb {
@@ -245,9 +246,17 @@ impl<'a> PathTracer<'a> {
         let Some(hit) = hit.filter(|hit| hit.front) else { return Rgb::ZERO };
         let between = near..hit.distance - self.contact;
         let passed = self.panes.transmittance(position, direction, between);
-        let at = position + hit.distance * direction;
-        let (reflected, _) = self.path_to(&hit, at, true, |_| false, rng);
-        passed * (reflected - known(&hit))
+        let mut at = position + hit.distance * direction;
+        let (mut share, mut end) = (passed, hit);
+        if !is_known(&hit) {
+            let (_, reached) = self.path_to(&hit, at, true, is_known, rng);
+            let Some((of_end, hit)) = reached else { return Rgb::ZERO };
+            let [a, b, c] = self.scene.corners(hit.triangle);
+            at = a + hit.u * (b - a) + hit.v * (c - a);
+            (share, end) = (passed * of_end, hit);
+        }
+        let (reflected, _) = self.path_to(&end, at, true, |_| false, rng);
+        share * (reflected - known(&end))
     }
 
     /// The radiosity of what is seen from `position` along unit `direction` without the light that
@@ -260,7 +269,8 @@ impl<'a> PathTracer<'a> {
         rng: &mut Rng,
     ) -> Rgb {
         if self.first_hit(position, direction, self.contact, None).is_some() {
-            return self.missed(position, direction, self.contact, |_| Rgb::ZERO, rng);
+            let all = |_: &Hit| true;
+            return self.missed([position, direction], self.contact, all, |_| Rgb::ZERO, rng);
         }
         let reach = self.contact..f64::INFINITY;
         let passed = self.panes.transmittance(position, direction, reach);

@@ -12,7 +12,7 @@ use crate::bake::BakeResult;
 use crate::error::{Error, ErrorKind};
 use crate::gather::gather_points::is_buried;
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
-use crate::gather::{Gather, GatheredMesh};
+use crate::gather::{Gather, GatheredMesh, IrradianceSample};
 use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 
@@ -29,6 +29,11 @@ pub struct LightMap {
     pub irradiance: Vec<Rgb>,
     /// Whether a texel gathered. Others are empty, or filled from their neighbours.
     pub gathered: Vec<bool>,
+    /// Standard error of each texel that gathered, W/m², a length over the channels: by sampling
+    /// alone until the map is [corrected](LightMap::correct).
+    pub standard_error: Vec<f64>,
+    /// Whether paths had the light of near surfaces at a texel.
+    pub(super) near_paths: Vec<bool>,
     /// The triangle on which each texel gathers, or none.
     pub(super) triangles: Vec<u32>,
 }
@@ -71,24 +76,19 @@ impl LightMap {
         let covered: Vec<u32> = (0..triangles.len() as u32)
             .filter(|&texel| triangles[texel as usize] != NO_TRIANGLE)
             .collect();
-        let mut irradiance = vec![Rgb::ZERO; triangles.len()];
-        let mut gathered = vec![false; triangles.len()];
-        let mut buried = vec![];
+        let mut map = LightMap::empty(atlas.clone(), triangles);
         let (field, points) = (light.radiosity_field(), TexelPoints::new(&atlas));
         let (mut remaining, mut batches) = (&covered[..], BatchSizer::new(256));
         while !remaining.is_empty() {
             batches.next(&mut remaining, |batch| {
-                let triangle = |texel: u32| triangles[texel as usize] as usize;
+                let triangle = |texel: u32| map.triangles[texel as usize] as usize;
                 let point = |&texel: &u32| points.point(texel, triangle(texel));
                 let batch_points: Vec<TwoSidedPoint> = batch.iter().map(point).collect();
                 let samples = gather_two_sided(gatherer, &field, &batch_points)?;
-                for (&texel, sample) in batch.iter().zip(&samples) {
-                    irradiance[texel as usize] = sample.irradiance;
-                    if is_buried(sample, points.texel_size(triangle(texel))) {
-                        buried.push(texel);
-                    } else {
-                        gathered[texel as usize] = true;
-                    }
+                let size = |&texel: &u32| points.texel_size(triangle(texel));
+                let sizes: Vec<f64> = batch.iter().map(size).collect();
+                for ((&texel, sample), size) in batch.iter().zip(&samples).zip(sizes) {
+                    map.set(texel as usize, sample, !is_buried(sample, size));
                 }
                 Ok::<_, Error>(())
             })?;
@@ -96,11 +96,40 @@ impl LightMap {
                 return Ok(None);
             }
         }
+        map.finish();
+        Ok(Some(map))
+    }
+
+    /// A map whose texels gather on these triangles, or on none, and did not yet.
+    fn empty(atlas: Atlas, triangles: Vec<u32>) -> LightMap {
+        let count = triangles.len();
+        LightMap {
+            atlas,
+            irradiance: vec![Rgb::ZERO; count],
+            gathered: vec![false; count],
+            standard_error: vec![0.0; count],
+            near_paths: vec![false; count],
+            triangles,
+        }
+    }
+
+    /// Sets what a texel gathered: it counts if the texel `is_open`, not inside of anything.
+    fn set(&mut self, texel: usize, sample: &IrradianceSample, is_open: bool) {
+        self.irradiance[texel] = sample.irradiance;
+        self.standard_error[texel] = sample.noise;
+        self.near_paths[texel] = sample.near_paths;
+        self.gathered[texel] = is_open;
+    }
+
+    /// Fills texels that did not gather, and makes seams agree.
+    pub(super) fn finish(&mut self) {
+        let LightMap { atlas, irradiance, gathered, triangles, .. } = self;
+        let is_buried = |&k: &u32| triangles[k as usize] != NO_TRIANGLE && !gathered[k as usize];
+        let buried = (0..triangles.len() as u32).filter(is_buried).collect();
         let mut known = gathered.clone();
-        fill_from_neighbours(&mut irradiance, &mut known, atlas.size, buried, usize::MAX);
-        seams::weld(&atlas, &mut irradiance);
-        dilate(&mut irradiance, &triangles, atlas.size);
-        Ok(Some(LightMap { atlas, irradiance, gathered, triangles }))
+        fill_from_neighbours(irradiance, &mut known, atlas.size, buried, usize::MAX);
+        seams::weld(atlas, irradiance);
+        dilate(irradiance, triangles, atlas.size);
     }
 
     /// Radiosity of each texel, W/m² per channel: exitance and reflected light of its material,

@@ -9,8 +9,7 @@
 //! ```
 //!
 //! The noise of the two is independent, so that it adds nothing to the mean of e². Errors of the
-//! gathered light itself are taken from the bake's estimate: bounces left out, unshot light, and
-//! light that only paths measured.
+//! light that both gather are not in it: [`LightMap::correct`].
 
 use std::ops::ControlFlow;
 
@@ -45,10 +44,10 @@ struct ShownPoint {
 }
 
 impl LightMap {
-    /// Error of the map's values, between texels too, and its standard error: the root mean square
-    /// over the reflecting surfaces of relative errors, with the measure of
-    /// [`ErrorEstimate`](crate::bake::ErrorEstimate). `baked` is the bake that the map was gathered
-    /// from.
+    /// How far off what the map shows is from what surfaces gather, between texels too, and its
+    /// standard error: the root mean square over the reflecting surfaces of relative errors, as in
+    /// [`accuracy`](crate::accuracy). `baked` is the bake that the map was gathered from, before it
+    /// is [corrected](LightMap::correct); what its light is off by itself is not in it.
     ///
     /// `progress` is called with the number of points done and of all points, several times a
     /// second; if it stops the work, the result is `None`, as it is if nothing reflects.
@@ -92,7 +91,7 @@ impl LightMap {
             }
         }
         let measure = baked.settings.measure;
-        Ok(root_mean_square(&errors, measure, baked.estimate.of_light()))
+        Ok(root_mean_square(&errors, measure))
     }
 
     /// Half of the points lie evenly over the reflecting surfaces, half in the cells between four
@@ -253,8 +252,8 @@ impl TexelError {
     }
 }
 
-/// The error by those at points, `errors`, and by that of the `light`.
-fn root_mean_square(errors: &[TexelError], measure: Measure, light: f64) -> Option<Estimate> {
+/// The error by those at points, `errors`.
+fn root_mean_square(errors: &[TexelError], measure: Measure) -> Option<Estimate> {
     let sum = |of: &dyn Fn(&TexelError) -> f64| errors.iter().map(of).sum::<f64>();
     let brightness = sum(&|point| point.area * point.mean().length()) / sum(&|point| point.area);
     // Where nothing arrives, nothing is wrong.
@@ -266,6 +265,6 @@ fn root_mean_square(errors: &[TexelError], measure: Measure, light: f64) -> Opti
     };
     let points: Vec<MeasuredPoint> = errors.iter().map(point).collect();
     let mut mean = TrimmedSquare::new(&points, measure.tail)?.mean;
-    mean.value = mean.value.max(0.0) + light * light;
+    mean.value = mean.value.max(0.0);
     (errors.len() > 1).then(|| mean.root())
 }

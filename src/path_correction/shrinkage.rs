@@ -126,12 +126,7 @@ impl<const N: usize> Shrinkage<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::random::random_numbers;
-
-    /// A normal deviate by Box and Muller (1958).
-    fn normal(rng: &mut fastrand::Rng) -> f64 {
-        (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (std::f64::consts::TAU * rng.f64()).cos()
-    }
+    use crate::sampling::random::{normal_deviate, random_numbers};
 
     /// Points that miss a normal with mean 3 and deviation `spread`, by paths that scatter by 8:
     /// estimates are as far off as they say, and no further than means of paths, or than the mean
@@ -144,9 +139,9 @@ mod tests {
             for trial in 0..trials {
                 let mut rng = random_numbers(&[trial, paths as u64]);
                 let truth: Vec<f64> =
-                    (0..points).map(|_| 3.0 + spread * normal(&mut rng)).collect();
+                    (0..points).map(|_| 3.0 + spread * normal_deviate(&mut rng)).collect();
                 let point = |truth: &f64| {
-                    let sample = |_| [Rgb::splat(truth + 8.0 * normal(&mut rng))];
+                    let sample = |_| [Rgb::splat(truth + 8.0 * normal_deviate(&mut rng))];
                     Missed::default().more(paths, sample)
                 };
                 let all: Vec<Missed<1>> = truth.iter().map(point).collect();

@@ -8,3 +8,9 @@ pub(crate) fn random_numbers(words: &[u64]) -> Rng {
     let hash = |seed, word: &u64| xxh3_64_with_seed(&word.to_le_bytes(), seed);
     Rng::with_seed(words.iter().fold(0, hash))
 }
+
+/// A normal deviate by Box and Muller (1958).
+#[cfg(test)]
+pub(crate) fn normal_deviate(rng: &mut Rng) -> f64 {
+    (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (std::f64::consts::TAU * rng.f64()).cos()
+}

@@ -10,6 +10,7 @@ mod scene;
 mod state;
 mod stl;
 mod texture;
+mod weather;
 
 use std::fs;
 use std::path::Path;
@@ -66,6 +67,12 @@ fn every_stl_input_keeps_its_promises() {
 fn every_photometric_file_keeps_its_promises() {
     let (accepted, refused) = replay("luminaire", luminaire::try_luminaire);
     assert!(accepted > 8 && refused > 8, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+fn every_weather_file_keeps_its_promises() {
+    let (accepted, refused) = replay("weather", weather::try_weather);
+    assert!(accepted > 4 && refused > 4, "{accepted} accepted, {refused} refused");
 }
 
 #[test]

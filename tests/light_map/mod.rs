@@ -1,4 +1,5 @@
 mod atlas;
+mod correction;
 mod files;
 mod light;
 mod shown_error;

@@ -25,6 +25,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::luminaire_light::LuminaireIrradiance;
+use crate::gather::near_surface::is_near_element;
 use crate::gather::visible::Visible;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
@@ -188,7 +189,7 @@ impl RayGather {
             }
             let passed = passed(hit.distance);
             let (element, local) = fields[0].mesh.element_at(hit.triangle, hit.u, hit.v);
-            if self.near_field.is_some() && NearField::is_near(fields[0].mesh, element, &hit) {
+            if self.near_field.is_some() && is_near_element(fields[0].mesh, element, &hit) {
                 near.push(NearRay { hit, direction, passed, ray });
             } else {
                 let reflected = |k: usize| match k {
@@ -199,6 +200,7 @@ impl RayGather {
             }
         });
         let is_covered = NearField::is_covered(near.len(), rays);
+        sums.of_all_fields.near_paths = is_covered;
         for ray in near {
             let path = self.near_field.as_ref().filter(|_| is_covered).map(|near_field| {
                 near_field.light(fields[0].mesh, point, rotation, &ray, direct.has_lights())
@@ -310,6 +312,7 @@ impl<const FIELDS: usize> RaySums for HemisphereRays<'_, FIELDS> {
         sum.escaped += term.escaped;
         sum.backface += term.backface;
         sum.inverse_distance += term.inverse_distance;
+        sum.near_paths |= term.near_paths;
         for (sum, term) in self.reflected.iter_mut().zip(other.reflected) {
             *sum += term;
         }

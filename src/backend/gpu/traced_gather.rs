@@ -192,6 +192,7 @@ impl TracedGather {
             escaped: sample.escaped.into(),
             backface: sample.back.into(),
             inverse_distance: self.scene.coordinates.inverse_length(sample.inverse_distance),
+            near_paths: sample.covered != 0,
         };
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let is_light = |c: Rgb| c.is_finite() && c.min_element() >= 0.0;
@@ -224,7 +225,7 @@ impl TracedGather {
         field: &FieldBuffers,
         points: &[TracedPoint],
         max_len: u32,
-    ) -> Result<Vec<(IrradianceSample, bool)>, Error> {
+    ) -> Result<Vec<IrradianceSample>, Error> {
         let gpu = self.gpu.clone();
         let mut kept = gpu.tracing.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let len = (self.batch_len(max_len) as usize).min(points.len());
@@ -346,7 +347,7 @@ impl TracedGather {
         &mut self,
         slots: &Slots,
         batch: &InFlight,
-        out: &mut Vec<(IrradianceSample, bool)>,
+        out: &mut Vec<IrradianceSample>,
     ) -> Result<(), Error> {
         let staging = &slots.slots[batch.slot].staging;
         let slice = staging.slice(..(size_of::<Sample>() * batch.points) as u64);
@@ -354,8 +355,7 @@ impl TracedGather {
         let samples = self.gpu.read_mapped(slice, batch.submission.clone(), |bytes| {
             let samples: &[Sample] = bytemuck::cast_slice(bytes);
             rays = samples.iter().map(|s| u64::from(s.rays + s.shadow_rays)).sum();
-            let sample = |s: &Sample| Ok((self.sample(s)?, s.covered != 0));
-            samples.par_iter().map(sample).collect::<Result<Vec<_>, String>>()
+            samples.par_iter().map(|s| self.sample(s)).collect::<Result<Vec<_>, String>>()
         })?;
         staging.unmap();
         self.rays += rays;
@@ -533,9 +533,8 @@ impl Gather for TracedGather {
             }
         };
         self.seconds += start.elapsed().as_secs_f64();
-        let samples = samples?;
-        let covered: Vec<usize> = (0..samples.len()).filter(|&k| samples[k].1).collect();
-        let mut samples: Vec<IrradianceSample> = samples.into_iter().map(|s| s.0).collect();
+        let mut samples = samples?;
+        let covered: Vec<usize> = (0..samples.len()).filter(|&k| samples[k].near_paths).collect();
         if let Some(on_cpu) = &mut self.on_cpu {
             let points: Vec<GatherPoint> = covered.iter().map(|&k| points[k]).collect();
             for (k, sample) in covered.into_iter().zip(on_cpu.gather(field, &points)?) {

@@ -27,6 +27,10 @@ use crate::{interrupt, progress};
 /// Texels along a side where the error asked for says how many: the fewest and the most.
 const PIXELS: RangeInclusive<u32> = 64..=2048;
 
+/// Share of the error asked for that may be lost between texels: it leaves 0.6 for the light, since
+/// squares add up. Plain choice: as many texels again would leave more than paths cost.
+const BETWEEN_TEXELS: f64 = 0.8;
+
 /// Pixels of the picture.
 const PICTURE: [u32; 2] = [768, 512];
 
@@ -101,10 +105,18 @@ pub struct Options {
     device: DeviceOptions,
 }
 
-/// An error, in words.
-fn said(shown: &Estimate) -> String {
-    let [value, standard_error] = [shown.value, shown.standard_error].map(|x| 100.0 * x);
-    format!("radiosity that is off by {value:.2} ± {standard_error:.2} %")
+/// How far off what a map shows is, and by what.
+struct Shown {
+    /// What is lost of the light between texels.
+    between: Estimate,
+    /// Error of the light at texels.
+    of_light: f64,
+}
+
+impl Shown {
+    fn total(&self) -> f64 {
+        self.between.value.hypot(self.of_light)
+    }
 }
 
 /// The light of a bake at the texels of `atlas`, unless Ctrl-C stopped either.
@@ -180,7 +192,7 @@ impl Options {
             total - texels
         );
         progress::print_written();
-        let is_reached = self.print_shown(shown, &baked);
+        let is_reached = self.print_shown(shown);
         args::end_at(is_reached)
     }
 
@@ -231,14 +243,36 @@ impl Options {
         Atlas::new(scene, resolution, self.coordinates)
     }
 
-    /// The map of `baked`, and how far off it was measured to be; with as many texels as that
+    /// The map of `baked`, corrected by paths, and how far off it is; with as many texels as that
     /// takes, unless their number was given. Ctrl-C leaves the last that was done.
     fn map(
+        &self,
+        atlas: Atlas,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<(LightMap, Option<Shown>), Stop> {
+        let (mut map, between) = self.resolved_map(atlas, baked, device)?;
+        let Some(between) = between else { return Ok((map, None)) };
+        // A quarter of it where texels leave less, since paths cost by the square.
+        let left = (self.error().powi(2) - between.value.powi(2)).max(0.0).sqrt();
+        let left = left.max(0.25 * self.error());
+        let of_light = match args::end() {
+            Ok(()) => progress::of_stoppable("paths", |report| map.correct(baked, left, report))?,
+            Err(_) => None,
+        };
+        let of_light = of_light.unwrap_or_else(|| baked.estimate.of_light());
+        Ok((map, Some(Shown { between, of_light })))
+    }
+
+    /// The map of `baked`, and how much of its light is lost between texels; with as many texels as
+    /// that takes, unless their number was given. Ctrl-C leaves the last that was done.
+    fn resolved_map(
         &self,
         mut atlas: Atlas,
         baked: &BakeResult,
         device: &Backend,
     ) -> Result<(LightMap, Option<Estimate>), Stop> {
+        let between = BETWEEN_TEXELS * self.error();
         let mut coarser: Option<(LightMap, Estimate)> = None;
         loop {
             let (scene, pixels) = (atlas.scene().clone(), atlas.width().max(atlas.height()));
@@ -251,14 +285,13 @@ impl Options {
             let Some(shown) = shown.filter(|_| self.resolution().is_none()) else {
                 return Ok((map, shown));
             };
-            // What the light itself is off by is for no texel to mend.
-            let is_enough = shown.value <= self.error() || baked.estimate.of_light() > self.error();
-            if is_enough || pixels >= *PIXELS.end() {
+            if shown.value <= between || pixels >= *PIXELS.end() {
                 return Ok((map, Some(shown)));
             }
-            eprintln!("{pixels} texels along a side show {}", said(&shown));
+            let lost = 100.0 * shown.value;
+            eprintln!("{pixels} texels along a side lose {lost:.2} % of the light between them");
             // The error falls no faster than texels become small.
-            let times = (shown.value / self.error()).log2().floor().max(1.0).exp2();
+            let times = (shown.value / between).log2().floor().max(1.0).exp2();
             let pixels = (f64::from(pixels) * times).min(f64::from(*PIXELS.end()));
             coarser = Some((map, shown));
             atlas = progress::of_stage("laying out surfaces", || {
@@ -267,7 +300,7 @@ impl Options {
         }
     }
 
-    /// How far off what `map` shows is; none where nothing is to be measured.
+    /// How much of the light is lost between texels; none where nothing is to be measured.
     fn shown_error(
         &self,
         map: &LightMap,
@@ -283,21 +316,25 @@ impl Options {
     }
 
     /// Says whether the map shows what was asked for, and gives it.
-    fn print_shown(&self, shown: Option<Estimate>, baked: &BakeResult) -> bool {
+    fn print_shown(&self, shown: Option<Shown>) -> bool {
         let Some(shown) = shown else { return true };
         // In the digits that it was asked in.
         let asked = (100.0 * self.error()) as f32;
-        let of_light = baked.estimate.of_light();
-        if shown.value <= self.error() {
-            say!("{asked} % reached: the map shows {}", said(&shown));
-        } else {
-            let remedy = match of_light > self.error() {
-                true => format!("{:.2} % is the light that texels gather", 100.0 * of_light),
-                false => "more texels (--size) would do".into(),
-            };
-            say!("{asked} % missed: the map shows {}; {remedy}", said(&shown));
-        }
-        shown.value <= self.error()
+        let is_reached = shown.total() <= self.error();
+        let remedy = match () {
+            () if is_reached => "",
+            () if shown.between.value > shown.of_light => "; more texels (--size) would do",
+            () => "; paths at texels are too few",
+        };
+        let [total, between, of_light, noise] =
+            [shown.total(), shown.between.value, shown.of_light, shown.between.standard_error]
+                .map(|x| 100.0 * x);
+        say!(
+            "{asked} % {}: the map shows radiosity that is off by {total:.2} %: {between:.2} ± \
+             {noise:.2} % between texels, {of_light:.2} % of the light{remedy}",
+            if is_reached { "reached" } else { "missed" }
+        );
+        is_reached
     }
 
     fn write(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {

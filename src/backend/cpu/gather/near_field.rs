@@ -18,6 +18,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use crate::gather::GatherPoint;
+use crate::gather::near_surface::is_near;
 use crate::light::PathTracer;
 use crate::mesh::Mesh;
 use crate::sampling::random::random_numbers;
@@ -50,18 +51,6 @@ pub(super) struct NearField {
 }
 
 impl NearField {
-    /// Whether a hit on `element` of `mesh` is near: nearer than the element is wide.
-    pub fn is_near(mesh: &Mesh, element: usize, hit: &Hit) -> bool {
-        // A right triangle with two sides of this width has the area.
-        let square = 2.0 * mesh.area(mesh.element(element));
-        hit.distance * hit.distance < square
-    }
-
-    /// Whether `hit` is nearer than the element of `mesh` there is wide.
-    pub fn is_near_at(mesh: &Mesh, hit: &Hit) -> bool {
-        NearField::is_near(mesh, mesh.element_at(hit.triangle, hit.u, hit.v).0, hit)
-    }
-
     /// Whether paths find the light of near surfaces: where more than half of `rays` are `near`.
     /// Plain choice.
     pub fn is_covered(near: usize, rays: usize) -> bool {
@@ -83,7 +72,7 @@ impl NearField {
         let paths = self.paths.get_or_init(|| PathTracer::of_shared(mesh.shared_scene()));
         let mut rng = random_numbers(&[rotation.to_bits(), u64::from(ray.ray)]);
         let position = point.position + ray.hit.distance * ray.direction;
-        let ends = |hit: &Hit| !NearField::is_near_at(mesh, hit);
+        let ends = |hit: &Hit| !is_near(mesh, hit);
         let (light, end) = paths.path_to(&ray.hit, position, by_area, ends, &mut rng);
         NearLight { light, end }
     }

@@ -9,6 +9,7 @@ use super::direct_light::DirectLight;
 use super::near_field::{NearField, NearLight, NearRay};
 use super::scene_rays::RAYS_PER_SHADOW_RAY;
 use crate::gather::GatherPoint;
+use crate::gather::near_surface::is_near;
 use crate::gather::point_row::{PointRow, PointRows, SurfaceHit};
 use crate::gather::visible::Visible;
 use crate::mesh::Mesh;
@@ -88,7 +89,7 @@ impl RayGather {
                 return;
             }
             let passed = passed(hit.distance);
-            if near_field.is_some() && NearField::is_near_at(source, &hit) {
+            if near_field.is_some() && is_near(source, &hit) {
                 near.push((row.hits.len(), NearRay { hit, direction, passed, ray }));
             }
             row.hits.push(surface_hit(mesh, &hit, passed, direct.is_none()));

@@ -671,8 +671,8 @@ fn light_in_a_narrow_gap_is_that_of_rays_on_the_cpu() {
         };
         let points: Vec<GatherPoint> = (0..32).map(near_by).collect();
         let actual = gathered(&mut device, &field, &points, MAX_POINTS);
-        assert!(actual.iter().all(|(_, is_covered)| *is_covered), "{centre:?} is covered");
-        let actual = mean_and_variance(actual.into_iter().map(|(sample, _)| sample));
+        assert!(actual.iter().all(|sample| sample.near_paths), "{centre:?} is covered");
+        let actual = mean_and_variance(actual.into_iter());
         let expected = mean_and_variance(cpu.gather(&field, &points).unwrap().into_iter());
         let off = actual.0 - expected.0;
         let error = (actual.1 + expected.1).map(f64::sqrt);
@@ -897,13 +897,13 @@ fn any_state(seed: u64, lights: u32, settings: &GatherSettings) -> PointState {
 // ---------------------------------------------------------------------------------------------
 // The same bits.
 
-/// Gathers at these points, at most `max` at once; also whether near surfaces cover each.
+/// Gathers at these points, at most `max` at once.
 fn gathered(
     gather: &mut TracedGather,
     field: &RadiosityField,
     points: &[GatherPoint],
     max: u32,
-) -> Vec<(IrradianceSample, bool)> {
+) -> Vec<IrradianceSample> {
     let traced: Vec<TracedPoint> = points.iter().map(|p| gather.traced_point(p)).collect();
     let buffers = gather.gpu.tracing.field(&gather.scene, field, || gather.gpu.memory()).unwrap();
     gather.gather_all(&buffers, &traced, max).unwrap()
@@ -925,10 +925,7 @@ fn gathers_have_the_same_bits_in_any_batches() {
         assert!(all.iter().any(|sample| sample.noise > 0.0));
         for max in [MAX_POINTS, 64, 23] {
             let again = gathered(&mut gather, &field, &points, max);
-            assert!(
-                again.into_iter().map(|s| s.0).eq(all.iter().copied()),
-                "{name}: {max} at once"
-            );
+            assert!(again == all, "{name}: {max} at once");
         }
         assert!(new().gather(&field, &points).unwrap() == all, "{name}: another gather");
         for k in (0..200).step_by(41) {

@@ -1,0 +1,193 @@
+//! What the light of a bake misses all over surfaces, by paths that neighbours share.
+//!
+//! Thousands of points in one place miss nearly the same. So a point needs no paths of its own:
+//! what it misses is estimated over [nested cells](super::nested_cells) of points that are alike,
+//! in position, normal and brightness: what arrives on two sides of a wall differs. Several sets of
+//! cells, shifted at random, are averaged, so that no edges of cells show.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::nested_cells::{CellSamples, Estimate, NestedCells, Sample, SpreadSums};
+use crate::progress::BatchSizer;
+use crate::sampling::low_discrepancy::radical_inverse;
+use crate::sampling::random::random_numbers;
+use crate::sampling::surface::AreaSampler;
+use crate::scene::Rgb;
+
+/// Sets of cells: the edges of one show with an eighth of its steps.
+const SETS: usize = 8;
+
+/// Paths of a finest cell: its scatter is that of its surroundings before.
+const PATHS_OF_CELL: usize = 32;
+
+/// Paths of the first round, and the maximum. The first bring what all points miss in common to
+/// 2 % of itself where paths scatter by 2.5 times their mean; the last take 128 MiB.
+const PATHS: [usize; 2] = [1 << 14, 1 << 23];
+
+/// Position over the diagonal of the scene, normal and octave of light in the space of cells: two
+/// normals a radian apart are as far from each other as two points half of the diagonal apart, and
+/// so is light of 1 and 16. Cells are as good with twice or half as much.
+const SHARE_OF_NORMAL: f64 = 0.5;
+const SHARE_OF_OCTAVE: f64 = 0.125;
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Over the diagonal of the scene, from its corner: in [0, 1].
+    pub position: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+    /// W/m²: what its errors are a share of, above 0.
+    pub scale: f64,
+    /// Area that it stands for.
+    pub area: f64,
+}
+
+/// What is missed at points, as shares of their scales.
+#[derive(Clone, Debug)]
+pub(crate) struct MissedLight {
+    pub missed: Vec<Rgb>,
+    /// Variance of `missed`, a sum over the channels.
+    pub variance: Vec<f64>,
+    /// Root mean square of the standard errors over area.
+    pub error: f64,
+}
+
+/// The paths so far.
+struct Paths<'a> {
+    places: &'a [Place],
+    areas: Vec<f64>,
+    sets: Vec<NestedCells>,
+    /// Places in an order that has neighbours together.
+    order: Vec<u32>,
+    samples: Vec<Sample>,
+}
+
+/// What is missed at `places`, by paths whose number grows until the root mean square over area of
+/// standard errors is at most `error`, or there are as many as can be. The edge of the finest cells
+/// is `finest` to twice that, over the diagonal of the scene. `sample` gives what path number
+/// `path` finds missing at a place, W/m², without bias. None where `progress`, as in
+/// [`super::correct_by_paths`], stops the work.
+pub(crate) fn missed_light(
+    places: &[Place],
+    finest: f64,
+    error: f64,
+    sample: impl Fn(usize, usize) -> Rgb + Sync,
+    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Option<MissedLight> {
+    let mut paths = Paths::new(places, finest);
+    let mut weights = paths.areas.clone();
+    let mut count = PATHS[0];
+    loop {
+        let report = |done: usize| progress(done, count);
+        if paths.trace(count, &weights, &sample, report).is_break() {
+            return None;
+        }
+        let (missed, variances) = paths.missed();
+        if missed.error <= error || count >= PATHS[1] {
+            return Some(missed);
+        }
+        // The number of paths in proportion to their scatter makes the mean of variances least
+        // (Neyman 1934).
+        weights = variances.iter().zip(&paths.areas).map(|(v, area)| v.sqrt() * area).collect();
+        count *= 2;
+    }
+}
+
+impl Place {
+    /// In the space of cells.
+    fn point(&self) -> [f32; 7] {
+        let [x, y, z] = self.position.to_array();
+        let [u, v, w] = (SHARE_OF_NORMAL * self.normal).to_array();
+        [x, y, z, u, v, w, SHARE_OF_OCTAVE * self.scale.log2()].map(|x| x as f32)
+    }
+}
+
+impl Paths<'_> {
+    fn new(places: &[Place], finest: f64) -> Paths<'_> {
+        let points: Vec<[f32; 7]> = places.iter().map(Place::point).collect();
+        // 2⁻²⁰ is what 32-bit floats resolve of the diagonal.
+        let depth = (-finest.log2()).floor().clamp(1.0, 20.0) as i32;
+        let set = |k: usize| {
+            let mut rng = random_numbers(&[k as u64]);
+            NestedCells::new(&points, depth, std::array::from_fn(|_| rng.f32()))
+        };
+        let sets: Vec<NestedCells> = (0..SETS).into_par_iter().map(set).collect();
+        let areas = places.iter().map(|place| place.area).collect();
+        Paths { places, areas, order: sets[0].order(), sets, samples: vec![] }
+    }
+
+    /// Traces until there are `count` paths, in proportion to `weights` of places. `progress` gets
+    /// the number of all.
+    fn trace(
+        &mut self,
+        count: usize,
+        weights: &[f64],
+        sample: &(impl Fn(usize, usize) -> Rgb + Sync),
+        mut progress: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let along = AreaSampler::new(self.order.iter().map(|&item| weights[item as usize]));
+        let (first, round) = (self.samples.len(), radical_inverse(self.samples.len() as u32 + 1));
+        let numbers: Vec<usize> = (first..count).collect();
+        let (mut remaining, mut batches) = (&numbers[..], BatchSizer::new(1024));
+        while !remaining.is_empty() {
+            let traced = batches.next(&mut remaining, |batch| {
+                let trace = |&path: &usize| {
+                    let share = ((path - first) as f64 + round) / (count - first) as f64;
+                    let item = self.order[along.locate(share).0];
+                    let scale = self.places[item as usize].scale;
+                    let value = sample(item as usize, path) / scale;
+                    Sample { item, value: value.to_array().map(|x| x as f32) }
+                };
+                batch.par_iter().map(trace).collect::<Vec<_>>()
+            });
+            self.samples.extend(traced);
+            progress(self.samples.len())?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// What is missed, and the variance of a sample at each place.
+    fn missed(&self) -> (MissedLight, Vec<f64>) {
+        let most = self.samples.len() / PATHS_OF_CELL;
+        let (first, last) = (&self.sets[0], self.sets[0].levels() - 1);
+        let left_out = (0..last).find(|&l| first.count(l) <= most).unwrap_or(last);
+        let sets: Vec<NestedCells> =
+            self.sets.par_iter().map(|set| set.coarsened(left_out)).collect();
+        let of_set = |set| CellSamples::new(set, &self.samples, &self.areas);
+        let samples: Vec<CellSamples> = sets.par_iter().map(of_set).collect();
+        let (spreads, uncertainty) = spreads(&sets, &samples);
+        let estimates: Vec<Vec<Estimate>> =
+            samples.par_iter().map(|samples| samples.estimates(&spreads)).collect();
+        let share = 1.0 / SETS as f64;
+        let at = |item: usize| {
+            let of_sets = sets.iter().zip(&estimates);
+            let sum = of_sets.fold((Rgb::ZERO, 0.0), |(value, variance), (set, estimates)| {
+                let estimate = estimates[set.cells[item] as usize];
+                (value + estimate.value, variance + estimate.variance)
+            });
+            // Within a finest cell values differ by as much as such cells do.
+            (share * sum.0, share * sum.1 + spreads[0] + uncertainty)
+        };
+        let (missed, variance): (Vec<Rgb>, Vec<f64>) =
+            (0..self.places.len()).into_par_iter().map(at).unzip();
+        let all: f64 = self.areas.iter().sum();
+        let square: f64 = variance.iter().zip(&self.areas).map(|(v, area)| v * area).sum();
+        let error = (square / all.max(f64::MIN_POSITIVE)).sqrt();
+        let variances = (0..self.places.len()).map(|item| samples[0].variance(item)).collect();
+        (MissedLight { missed, variance, error }, variances)
+    }
+}
+
+/// τ² of each level, by the samples of all sets, and one standard error of their sum: it is in the
+/// errors of values, since too small spreads would hide errors.
+fn spreads(sets: &[NestedCells], samples: &[CellSamples]) -> (Vec<f64>, f64) {
+    let mut sums = vec![SpreadSums::default(); sets[0].levels()];
+    samples.iter().for_each(|samples| samples.add_spreads(&mut sums));
+    let spreads = sums.iter().map(|sums| sums.spread(sets.len() as f64));
+    let variance: f64 = spreads.clone().map(|[_, variance]| variance).sum();
+    (spreads.map(|[spread, _]| spread).collect(), variance.sqrt())
+}
