@@ -46,6 +46,7 @@ const BATCH_DURATION: Duration = Duration::from_millis(250);
 
 /// Splits a list of like items into batches of similar duration. Results must not depend on batch
 /// ends, which follow the clock.
+#[derive(Clone)]
 pub(crate) struct BatchSizer {
     /// Items in the next batch.
     size: usize,

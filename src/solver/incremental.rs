@@ -177,12 +177,7 @@ impl<'m> SolveSession<'m> {
         rows.rebuild_missing(old, before, patches.iter().copied())?;
         let uncached: Vec<NodeId> =
             patches.iter().copied().filter(|&p| !rows.contains(p)).collect();
-        let uncached_rows = if uncached.is_empty() {
-            vec![]
-        } else {
-            rows.make(old, before, &uncached, importance)?
-        };
-        let mut uncached_rows = uncached_rows.into_iter();
+        let mut uncached_rows = rows.make(old, before, &uncached, importance)?.into_iter();
         let new_rows = rows.make(mesh, after, patches, importance)?;
         for (&patch, new_row) in patches.iter().zip(new_rows) {
             let old_row = match rows.get(patch) {

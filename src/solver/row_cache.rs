@@ -17,6 +17,7 @@ use super::ledger::largest_share;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
+use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 
 /// Rows by patch, and the flux sent along each.
@@ -29,6 +30,8 @@ pub(super) struct RowCache {
     free_bytes: usize,
     /// Rows computed so far.
     pub rows_made: u64,
+    /// Sizes of requests to the source of rows, so that none takes long.
+    requests: BatchSizer,
 }
 
 /// Record of a patch that has sent light.
@@ -53,6 +56,7 @@ impl RowCache {
             histories: BTreeMap::new(),
             free_bytes: budget,
             rows_made: 0,
+            requests: BatchSizer::new(16),
         }
     }
 
@@ -122,16 +126,33 @@ impl RowCache {
         &mut self,
         mesh: &Mesh,
         row_source: &mut dyn FormFactors,
-        patches: &[NodeId],
+        mut patches: &[NodeId],
         importance: f64,
     ) -> Result<Vec<Row>, Error> {
-        let rows = checked_rows(row_source, mesh, patches, importance)?;
+        let mut rows = vec![];
+        while !patches.is_empty() {
+            rows.extend(self.make_some(mesh, row_source, &mut patches, importance)?);
+        }
+        Ok(rows)
+    }
+
+    /// The same for the first of `patches`, as many as take a fraction of a second; these are taken
+    /// off. A row does not depend on which others are requested with it.
+    pub fn make_some(
+        &mut self,
+        mesh: &Mesh,
+        row_source: &mut dyn FormFactors,
+        patches: &mut &[NodeId],
+        importance: f64,
+    ) -> Result<Vec<Row>, Error> {
+        let make = |request: &[NodeId]| checked_rows(row_source, mesh, request, importance);
+        let rows = self.requests.next(patches, make)?;
         self.rows_made += rows.len() as u64;
         Ok(rows)
     }
 
-    /// Recomputes those rows of `patches` that are cached but missing from memory, in the batch
-    /// size of `row_source`. The same importance gives the same bits.
+    /// Recomputes those rows of `patches` that are cached but missing from memory. The same
+    /// importance gives the same bits.
     pub fn rebuild_missing(
         &mut self,
         mesh: &Mesh,
@@ -148,16 +169,14 @@ impl RowCache {
             .map(|run| (importance(&run[0]), run.to_vec()))
             .collect();
         for (importance, patches) in by_importance {
-            for batch in patches.chunks(row_source.preferred_batch_len().max(1)) {
-                let rows = self.make(mesh, row_source, batch, importance)?;
-                self.rows.extend(batch.iter().copied().zip(rows.into_iter().map(Arc::new)));
-            }
+            let rows = self.make(mesh, row_source, &patches, importance)?;
+            self.rows.extend(patches.into_iter().zip(rows.into_iter().map(Arc::new)));
         }
         Ok(())
     }
 
     /// The rows of the first of `elements`, in their order: as many as are cached or fit in one
-    /// batch of new rows, at least one.
+    /// request for new rows, at least one.
     pub fn next_element_rows(
         &mut self,
         mesh: &Mesh,
@@ -184,18 +203,21 @@ impl RowCache {
         let new_rows = if uncached.is_empty() {
             vec![]
         } else {
-            self.make(mesh, row_source, &uncached, importance)?
+            self.make_some(mesh, row_source, &mut &uncached[..], importance)?
         };
         let mut new_rows = new_rows.into_iter();
         let mut rows = Vec::with_capacity(reached.len());
         for (e, patch) in reached {
-            if let Some(row) = self.get(patch) {
-                rows.push((e, row.clone()));
-            } else if let Some(row) = new_rows.next() {
-                let row = Arc::new(row);
-                self.insert(patch, row.clone(), importance);
-                rows.push((e, row));
-            }
+            let row = match self.get(patch) {
+                Some(row) => row.clone(),
+                None => {
+                    let Some(row) = new_rows.next() else { break };
+                    let row = Arc::new(row);
+                    self.insert(patch, row.clone(), importance);
+                    row
+                }
+            };
+            rows.push((e, row));
         }
         Ok(rows)
     }

@@ -72,7 +72,9 @@ impl<'m> Shooting<'m> {
             max_shots,
             |patch| !step.rows.contains(patch),
         );
-        let new_rows = NewRows::make(step, &shots)?;
+        let Some(new_rows) = NewRows::make(step, &shots)? else {
+            return Ok(Some(StopReason::Cancelled));
+        };
         self.shoot(step, shots, new_rows, ambient_overshoot)
     }
 
@@ -123,7 +125,8 @@ struct NewRows {
 }
 
 impl NewRows {
-    fn make(step: &mut StepContext, shots: &[Shot]) -> Result<NewRows, Error> {
+    /// `None` when the callback stops the solver: all rows of a batch may take long.
+    fn make(step: &mut StepContext, shots: &[Shot]) -> Result<Option<NewRows>, Error> {
         let mesh = step.state.mesh;
         let missing: Vec<&Shot> =
             shots.iter().filter(|shot| !step.rows.contains(shot.patch)).collect();
@@ -134,12 +137,16 @@ impl NewRows {
             .min(1.0);
         let patches: Vec<NodeId> = missing.iter().map(|shot| shot.patch).collect();
         step.rows.rebuild_missing(mesh, step.row_source, shots.iter().map(|shot| shot.patch))?;
-        let rows = if patches.is_empty() {
-            vec![]
-        } else {
-            step.rows.make(mesh, step.row_source, &patches, importance)?
-        };
-        Ok(NewRows { rows, importance })
+        let (mut rows, mut remaining) = (vec![], &patches[..]);
+        while !remaining.is_empty() {
+            let some = step.rows.make_some(mesh, step.row_source, &mut remaining, importance)?;
+            rows.extend(some);
+            let unshot_share = step.state.ledger.unshot_share();
+            if !remaining.is_empty() && step.report(unshot_share).is_break() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(NewRows { rows, importance }))
     }
 }
 

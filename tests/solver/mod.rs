@@ -5,5 +5,6 @@ mod incremental;
 mod methods;
 mod odd_geometry;
 mod patch_cut;
+mod requests;
 pub mod shooting;
 mod translucent;
