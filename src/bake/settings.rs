@@ -47,7 +47,7 @@ pub struct SolveSettings {
     pub gathered_materials: Vec<u32>,
     /// Pixels along an edge of a hemicube's top face, even, for patches that shoot much light; a
     /// half or a quarter of them for dimmer ones. Where rays are cast, the square root of their
-    /// number. A device casts rays too where these take less time: see
+    /// number, down to 16 for the dimmest. A device casts rays too where these take less time: see
     /// [`Backend::row_maker`](crate::Backend::row_maker).
     pub hemicube_resolution: u32,
     /// A patch that shoots at least this share of the emitted light gets the full resolution; 0 for

@@ -16,9 +16,6 @@
 //! more than the first, and all shots together some 1.2 times as much (the median in a Cornell box
 //! and in two rooms; five times at most).
 
-/// Maximum number of halvings of the resolution. Plain choice; no recorded measurement.
-pub(crate) const MAX_HALVINGS: u32 = 2;
-
 /// Minimum halved resolution, pixels along an edge: 768 pixels per hemicube. Fewer save no
 /// significant time.
 pub(crate) const MIN_HALVED_RESOLUTION: u32 = 16;
@@ -26,10 +23,8 @@ pub(crate) const MIN_HALVED_RESOLUTION: u32 = 16;
 /// Number of halvings of the resolution for a row of `weight`, with full resolution from
 /// `full_resolution_share` on: the largest that keeps it at or above N ∝ s^0.4.
 pub(crate) fn halvings_for_importance(weight: f64, full_resolution_share: f64) -> u32 {
-    // Half the resolution suffices for light reduced by this factor.
-    let fall = 2f64.powf(2.5);
-    let is_enough = |&k: &u32| weight * fall.powi(k as i32) < full_resolution_share;
-    (1..=MAX_HALVINGS).take_while(is_enough).last().unwrap_or(0)
+    // Below 0, and where both are 0, none.
+    (0.4 * (full_resolution_share / weight).log2()) as u32
 }
 
 /// An even `resolution` halved this number of times; even, and below [`MIN_HALVED_RESOLUTION`] only
@@ -44,7 +39,7 @@ mod tests {
 
     #[test]
     fn resolution_follows_law_from_above() {
-        let mut before = MAX_HALVINGS;
+        let mut before = u32::MAX;
         for k in 0..4000 {
             let share = 1e-8 * 1e9f64.powf(f64::from(k) / 4000.0);
             let halvings = halvings_for_importance(share, 4e-3);
@@ -53,11 +48,8 @@ mod tests {
             // In units of the full resolution: the actual one, and the one by the law.
             let (resolution, law) = (0.5f64.powi(halvings as i32), (share / 4e-3).powf(0.4));
             assert!(resolution >= law.min(1.0), "{share}: {resolution} {law}");
-            // Another halving would be too much, or the maximum is reached.
-            assert!(
-                resolution / 2.0 <= law || halvings == MAX_HALVINGS,
-                "{share}: {resolution} {law}"
-            );
+            // Another halving would be too much.
+            assert!(resolution / 2.0 <= law, "{share}: {resolution} {law}");
         }
         assert_eq!(
             (before, halvings_for_importance(4e-3, 4e-3), halvings_for_importance(1.0, 4e-3)),
@@ -69,7 +61,7 @@ mod tests {
                 halvings_for_importance(1e-4, 4e-3),
                 halvings_for_importance(0.0, 4e-3)
             ),
-            (1, 2, 2)
+            (1, 2, u32::MAX)
         );
     }
 

@@ -53,16 +53,16 @@ impl RayRows {
     pub fn new(mesh: &Mesh, count: u32) -> Result<RayRows, Error> {
         HemisphereSamples::new(count)?;
         let (rays, panes) = (RayScene::of_scene(mesh.scene()), Panes::of_scene(mesh.scene()));
-        // Fewer rows if each takes long; at least one per 4096 elements, since the choice of the
+        // Fewer rows if each takes long; at least one per 1024 elements, since the choice of the
         // next shots visits all elements: with 16 rows for a million of them, that took 27 s of 43.
         let few = ((1 << 20) / count).clamp(1, 16) as usize;
-        let batch_len = few.max(mesh.element_count() / 4096);
+        let batch_len = few.max(mesh.element_count() / 1024);
         Ok(RayRows { rays, panes, count, batch_len, full_share: RayRows::FULL_SHARE })
     }
 
     /// All rays for patches that shoot at least this share of the emitted flux, in [0, 1]; for
-    /// others a quarter or a sixteenth of them, but no less than 256 if `count` permits, by their
-    /// share: rays ∝ share^0.8 minimizes the error for the time. [`RayRows::FULL_SHARE`] by
+    /// others a quarter of them, a sixteenth and so on, but no less than 256 if `count` permits, by
+    /// their share: rays ∝ share^0.8 minimizes the error for the time. [`RayRows::FULL_SHARE`] by
     /// default; with 0 all rows have all rays.
     pub fn with_full_share(self, full_share: f64) -> RayRows {
         RayRows { full_share, ..self }
@@ -153,11 +153,11 @@ pub(crate) fn row_of_counts(items: impl Iterator<Item = (u32, u32)>, rays: usize
 }
 
 /// Number of rays of a patch that shoots `weight` of the emitted flux: all `count` from
-/// `full_share` on, a quarter or a sixteenth of them below, see [`RayRows::with_full_share`].
+/// `full_share` on, a quarter, a sixteenth … of them below, see [`RayRows::with_full_share`].
 pub(crate) fn rays_for_importance(count: u32, weight: f64, full_share: f64) -> u32 {
     let halvings = resolution_policy::halvings_for_importance(weight, full_share);
     let least = resolution_policy::MIN_HALVED_RESOLUTION.pow(2);
-    (count >> (2 * halvings)).max(least).min(count)
+    count.checked_shr(halvings.saturating_mul(2)).unwrap_or(0).max(least).min(count)
 }
 
 impl FormFactors for RayRows {

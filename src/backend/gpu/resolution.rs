@@ -7,6 +7,10 @@ use super::render_targets::RenderTargets;
 use crate::error::Error;
 use crate::form_factor::resolution_policy;
 
+/// Halvings of the resolution: each has item buffers of its own, and fewer pixels than with two
+/// save no significant time.
+const HALVINGS: u32 = 2;
+
 /// Item buffers of a batch of hemicubes of one resolution, and the weights of their pixels.
 #[derive(Debug)]
 pub struct Resolution {
@@ -28,7 +32,7 @@ impl Resolution {
         resolution: u32,
         batch: u32,
     ) -> Result<Vec<Resolution>, Error> {
-        let halvings = 0..=resolution_policy::MAX_HALVINGS;
+        let halvings = 0..=HALVINGS;
         let mut pixels: Vec<u32> =
             halvings.map(|k| resolution_policy::halved(resolution, k)).collect();
         pixels.dedup();

@@ -101,7 +101,7 @@ const SETTINGS: &[Setting] = &[
          diagonal / 32 at least]"),
     setting!(solve.hemicube_resolution,
         "pixels along an edge of a hemicube's top face, even, for patches that shoot much; dimmer \
-         ones have a half or a quarter of them, 16 at least [by the error; without one, 128]"),
+         ones have fewer, 16 at least [by the error; without one, 128]"),
     setting!(solve.full_resolution_share,
         "share of the emitted light from which on a patch shoots much; 0 for all patches [by the \
          device]"),
