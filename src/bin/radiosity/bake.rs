@@ -151,7 +151,6 @@ impl Bake {
         let opening = Instant::now();
         let device = self.device.open()?;
         let baking = Instant::now();
-        interrupt::catch();
         let mut baked = progress::of_bake(|unshot_goal, report| {
             self.bake(scene, &device, unshot_goal, report)
         })?;

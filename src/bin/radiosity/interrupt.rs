@@ -7,9 +7,11 @@
 //! Ctrl-C again ─────────────────────────────────────────────────────────────► exit status 130
 //! ```
 //!
-//! Before [`catch`] is called, Ctrl-C ends the program as it does any other.
+//! Before [`catch`] is called, Ctrl-C ends the program as it does any other. A bake calls it at its
+//! first progress report: before that there is nothing to write.
 
 use std::ops::ControlFlow;
+use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit status of a program that was interrupted: 128 + SIGINT, as shells have it.
@@ -19,15 +21,18 @@ static STOPPED: AtomicBool = AtomicBool::new(false);
 
 /// From here on the first Ctrl-C, SIGTERM or SIGHUP stops the work.
 pub fn catch() {
-    let caught = ctrlc::set_handler(|| {
-        if STOPPED.swap(true, Ordering::Relaxed) {
-            std::process::exit(EXIT_STATUS.into());
+    static CAUGHT: Once = Once::new();
+    CAUGHT.call_once(|| {
+        let caught = ctrlc::set_handler(|| {
+            if STOPPED.swap(true, Ordering::Relaxed) {
+                std::process::exit(EXIT_STATUS.into());
+            }
+            eprintln!("stopping, to write what there is; Ctrl-C again ends at once");
+        });
+        if let Err(error) = caught {
+            eprintln!("warning: Ctrl-C will lose what was done: {error}");
         }
-        eprintln!("stopping, to write what there is; Ctrl-C again ends at once");
     });
-    if let Err(error) = caught {
-        eprintln!("warning: Ctrl-C will lose what was done: {error}");
-    }
 }
 
 /// Whether the program was asked to end.

@@ -6,8 +6,8 @@ use clap::Args;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Scene};
 
 use crate::args::{DeviceOptions, SHARE, value};
+use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
-use crate::{interrupt, progress};
 
 /// The light, and how exact what is measured in it is to be.
 #[derive(Args)]
@@ -51,7 +51,6 @@ impl LightOptions {
     /// Bakes `scene` as far as it takes. Ctrl-C stops it with what there is.
     pub fn bake(&self, scene: Scene) -> Result<Light, Error> {
         let device = self.device.open()?;
-        interrupt::catch();
         // The light may be three times further off than what is measured in it, as one gather pass
         // than the next: errors of vertices are averaged over all that a point sees. Light that is
         // missed altogether is not averaged; hence 0.3 at most. Plain choice.

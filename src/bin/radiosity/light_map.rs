@@ -20,9 +20,9 @@ use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
 };
 use crate::bake::files::{self, SAMPLES, camera};
+use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
 use crate::viewer_options::{ViewerOptions, glb_settings};
-use crate::{interrupt, progress};
 
 /// Texels along a side where the error asked for says how many: the fewest and the most.
 const PIXELS: RangeInclusive<u32> = 64..=2048;
@@ -167,7 +167,6 @@ impl Options {
         let layout = start.elapsed().as_secs_f64();
         let device = self.device.open()?;
         let open = start.elapsed().as_secs_f64();
-        interrupt::catch();
         let mut baked = progress::of_bake(|_, report| {
             let measure = |settings: &mut BakeSettings| settings.measure = self.measure.measure();
             self.target().bake_with(atlas.scene().clone(), &device, measure, report)

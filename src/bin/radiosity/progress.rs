@@ -48,6 +48,7 @@ pub fn of_bake<T>(work: impl FnOnce(&Cell<f64>, OfBake) -> T) -> T {
     let mut display = Display::new("meshing");
     let unshot_goal = Cell::new(Solver::default().unshot);
     work(&unshot_goal, &mut |progress| {
+        interrupt::catch();
         show(&mut display, progress, unshot_goal.get());
         interrupt::flow()
     })
