@@ -58,6 +58,12 @@ pub(super) fn max_elements(triangles: usize) -> usize {
     per_triangle.max(4 * triangles)
 }
 
+/// Maximum number of elements where no vertex gathers, unless there are more triangles. A closed
+/// surface of 50 deep folds had an estimated error of 27 ± 2 % with 181 600 elements of a 32nd of
+/// its diagonal, and of 20 ± 2 % with 46 900 in 0.6 of the time: where surfaces fill space, rows
+/// have too few rays for each element.
+pub(super) const MAX_PREVIEW_ELEMENTS: usize = 1 << 16;
+
 /// Angle up to which triangles without smoothing group share vertices for `error`, degrees: 1.3
 /// times the error in radians. A shared vertex has the light of the mean normal, δ/2 from either;
 /// irradiance from an angle θ is then off by tan θ · δ/2, and half of the squares remain between

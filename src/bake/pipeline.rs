@@ -93,9 +93,9 @@ fn cut_scene(
     scene: &Arc<Scene>,
     target: Option<ErrorTarget>,
 ) -> Arc<Scene> {
-    let finest = match &settings.gather {
-        Some(gather) => gather.refinement.min_edge,
-        None => settings.solve.element_size,
+    let (finest, most) = match &settings.gather {
+        Some(gather) => (gather.refinement.min_edge, gather.refinement.max_elements),
+        None => (settings.solve.element_size, model::MAX_PREVIEW_ELEMENTS),
     };
     let scene = match target {
         Some(target) => &with_creases(scene, model::crease_degrees(target.error)),
@@ -105,7 +105,7 @@ fn cut_scene(
         Some(region) => &cut_large_triangles(scene, region),
         None => scene,
     };
-    cut_at_contacts(scene, finest)
+    cut_at_contacts(scene, finest, most)
 }
 
 /// `scene`, with creases where it does not say and normals differ by more than this.

@@ -127,12 +127,16 @@ impl BakeSettings {
         self.gather.as_ref().map_or(Ok(()), |gather| gather.refinement.check())
     }
 
-    /// Settings for previews: elements of a 32nd of the scene's diagonal, 1e-4 unshot, and no
-    /// vertex gathers.
+    /// Settings for previews: elements of a 32nd of the scene's diagonal, larger where there would
+    /// be more than 65 536, 1e-4 unshot, and no vertex gathers.
     pub fn elements_only(scene: &Scene) -> BakeSettings {
         let survey = LightSurvey::new(scene);
         let mut settings = BakeSettings::by_survey(0.02, &survey, scene);
-        settings.solve.element_size = settings.solve.element_size.max(survey.diagonal / 32.0);
+        let size = settings.solve.element_size.max(survey.diagonal / 32.0);
+        let sizing = settings.solve.sizing(scene, size);
+        let most = model::MAX_PREVIEW_ELEMENTS;
+        let sizing = sizing.within(scene, model::MAX_SHOOTING_DEPTH, most);
+        settings.solve.element_size = sizing.size;
         settings.solve.hemicube_resolution = 128;
         settings.solve.solver = Solver { unshot: 1e-4, ..Solver::default() };
         settings.gather = None;

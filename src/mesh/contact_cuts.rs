@@ -48,13 +48,14 @@ const CONTACT_DISTANCE: f64 = 0.05;
 const SNAP_DISTANCE: f64 = 0.02;
 
 /// `scene` with its reflecting triangles cut where others touch them, for elements with edges down
-/// to `finest` (scene unit); unchanged if none are touched.
-pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64) -> Arc<Scene> {
+/// to `finest` (scene unit); unchanged if none are touched, or if the pieces were more than about
+/// `most`.
+pub(crate) fn cut_at_contacts(scene: &Arc<Scene>, finest: f64, most: usize) -> Arc<Scene> {
     let topology = SurfaceTopology::of_scene(scene);
     let mut cuts = find_cuts(scene, &topology, finest);
     let segments: usize = cuts.iter().map(|cuts| cuts.segments.len()).sum();
-    // Each makes some pieces, and a mesh that fine resolves few of them.
-    if segments == 0 || segments > 1 << 17 {
+    // Each makes some four pieces, and a mesh that fine resolves few of 2^17.
+    if segments == 0 || segments > (most / 4).min(1 << 17) {
         return scene.clone();
     }
     share_side_points(&topology, &mut cuts);
@@ -188,6 +189,9 @@ mod tests {
         Arc::new(Scene::new(positions, triangles, groups, vec![Material::grey("m", 0.5)]).unwrap())
     }
 
+    /// More pieces than any scene here has.
+    const MANY: usize = 1 << 19;
+
     const FLOOR: [[f64; 3]; 4] =
         [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 8.0, 0.0], [0.0, 8.0, 0.0]];
 
@@ -212,7 +216,7 @@ mod tests {
         for bottom in [0.0, -1.0, 5e-5] {
             let wall = [[4.0, 0.0, bottom], [5.0, 8.0, bottom], [5.0, 8.0, 3.0], [4.0, 0.0, 3.0]];
             let scene = quads(&[FLOOR, wall]);
-            let cut = cut_at_contacts(&scene, 0.1);
+            let cut = cut_at_contacts(&scene, 0.1, MANY);
             let (pieces, surfaces) = floor_of(&cut);
             assert!((area(&pieces) - 80.0).abs() < 1e-9);
             // Distance to the wall's plane.
@@ -227,11 +231,21 @@ mod tests {
     }
 
     #[test]
+    fn no_more_pieces_are_cut_than_a_mesh_may_have() {
+        let wall = [[4.0, 0.0, 0.0], [5.0, 8.0, 0.0], [5.0, 8.0, 3.0], [4.0, 0.0, 3.0]];
+        let scene = quads(&[FLOOR, wall]);
+        // A segment makes about four.
+        for (most, is_cut) in [(3, false), (MANY, true)] {
+            assert_eq!(!Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1, most)), is_cut, "{most}");
+        }
+    }
+
+    #[test]
     fn walls_are_cut_across_the_sides_of_triangles() {
         // Near the floor's corner almost the whole foot is on one of its two triangles.
         for x in [1e-3, 10.0 - 1e-3] {
             let wall = [[x, 0.0, 0.0], [x, 8.0, 0.0], [x, 8.0, 3.0], [x, 0.0, 3.0]];
-            let (pieces, surfaces) = floor_of(&cut_at_contacts(&quads(&[FLOOR, wall]), 0.1));
+            let (pieces, surfaces) = floor_of(&cut_at_contacts(&quads(&[FLOOR, wall]), 0.1, MANY));
             assert!((area(&pieces) - 80.0).abs() < 1e-9);
             assert_eq!(surfaces, 2, "{x}: nothing continues around the end of its longer part");
         }
@@ -240,7 +254,7 @@ mod tests {
     #[test]
     fn surfaces_continue_around_the_end_of_a_wall() {
         let wall = [[4.0, 0.0, 0.0], [4.0, 5.0, 0.0], [4.0, 5.0, 3.0], [4.0, 0.0, 3.0]];
-        let cut = cut_at_contacts(&quads(&[FLOOR, wall]), 0.1);
+        let cut = cut_at_contacts(&quads(&[FLOOR, wall]), 0.1, MANY);
         let (pieces, surfaces) = floor_of(&cut);
         assert!(pieces.len() > 2 && surfaces == 1);
         // Along the wall there are two vertices at each position.
@@ -288,7 +302,7 @@ mod tests {
         for (width, is_slit) in [(0.05, true), (0.2, false)] {
             let second = box_on_floor([5.0 + width, 3.0], [7.0, 6.0]);
             let scene = quads(&[&[FLOOR][..], &first, &second].concat());
-            let cut = cut_at_contacts(&scene, 0.1);
+            let cut = cut_at_contacts(&scene, 0.1, MANY);
             let (pieces, _) = floor_of(&cut);
             assert!((area(&pieces) - 80.0).abs() < 1e-9);
             assert_eq!(pieces.len() > 2, is_slit, "{width}");
@@ -309,7 +323,7 @@ mod tests {
         let solid = [&[FLOOR][..], &box_on_floor([3.0, 3.0], [6.0, 6.0])].concat();
         let scene = quads(&solid);
         assert!(
-            Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1)),
+            Arc::ptr_eq(&scene, &cut_at_contacts(&scene, 0.1, MANY)),
             "the inside of a box is not visible"
         );
         // The floor is visible through a hole in the lid, which fills 1/30 of the view from floor
@@ -324,11 +338,11 @@ mod tests {
             lid([5.0, 6.0], [4.0, 5.0]),
         ];
         let holed = quads(&[&solid[..5], &frame].concat());
-        let (pieces, surfaces) = floor_of(&cut_at_contacts(&holed, 0.1));
+        let (pieces, surfaces) = floor_of(&cut_at_contacts(&holed, 0.1, MANY));
         assert!(pieces.len() > 2 && surfaces == 2, "what is within the walls, and without");
         // And without a lid.
         let open = quads(&solid[..5]);
-        assert!(cut_at_contacts(&open, 0.1).triangles().len() > open.triangles().len());
-        assert!(Arc::ptr_eq(&open, &cut_at_contacts(&open, 3.1 / SHORTEST_CUT)), "too short");
+        assert!(cut_at_contacts(&open, 0.1, MANY).triangles().len() > open.triangles().len());
+        assert!(Arc::ptr_eq(&open, &cut_at_contacts(&open, 3.1 / SHORTEST_CUT, MANY)), "too short");
     }
 }

@@ -5,6 +5,7 @@ pub mod cornell_box;
 mod cut_outs;
 mod luminaires;
 mod outcome;
+mod previews;
 mod sky;
 mod sky_models;
 mod surroundings;
