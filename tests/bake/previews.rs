@@ -5,8 +5,8 @@ use radiosity::{BakeSettings, Mesh};
 use crate::common::quads;
 use crate::common::scenes::paint;
 
-/// A hundred parallel sheets in a unit cube, all of which glow. Elements of a 32nd of the diagonal are 1.7/32 long,
-/// halvings of √2: 2·4⁵ on each sheet, 204 800 in all.
+/// A hundred parallel sheets in a unit cube, all of which glow. Elements of a 32nd of the diagonal
+/// are 1.7/32 long, halvings of √2: 2·4⁵ on each sheet, 204 800 in all.
 #[test]
 fn surfaces_that_fill_space_have_larger_elements() {
     let sheet = |k: u32| {
