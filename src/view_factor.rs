@@ -73,7 +73,7 @@ impl ViewFactors {
     /// or far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
     /// [`ViewFactors::sparse`]. [`ViewFactors::absent`] tells the two apart.
     ///
-    /// The time is predicted from the number of blockers between a few thousand pairs.
+    /// The time is predicted from cubature of up to a few thousand pairs.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1) or a group does not exist.
@@ -99,7 +99,7 @@ impl ViewFactors {
     ) -> Result<MatrixSize, Error> {
         check_settings(scene, error, two_sided)?;
         let polygons = ScenePolygons::new(scene, two_sided);
-        if effort::method(&polygons) == Method::Sparse {
+        if effort::method(&polygons, error) == Method::Sparse {
             return Ok(sparse::predicted_size(scene, polygons, error));
         }
         let factors = polygons.fronts.rows.count().pow(2);
@@ -221,7 +221,7 @@ impl PartialMatrix {
             let remedy = format!("the matrix has {count} rows, from 0");
             return Err(Error::new(ErrorKind::Setting, "rows", found, remedy));
         }
-        let method = effort::method(&polygons);
+        let method = effort::method(&polygons, error);
         let mut part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
         if let Some(done) = done {
             part.check_fits(&done, "rows that are done")?;
@@ -241,7 +241,7 @@ fn whole(
 ) -> Result<Option<ViewFactors>, Error> {
     check_settings(scene, error, two_sided)?;
     let polygons = ScenePolygons::new(scene, two_sided);
-    let method = method.unwrap_or_else(|| effort::method(&polygons));
+    let method = method.unwrap_or_else(|| effort::method(&polygons, error));
     let part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
     let all = 0..polygons.fronts.rows.count();
     let mut told = |_: &PartialMatrix, done, of| progress(done, of);

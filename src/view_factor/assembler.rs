@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::blocker_tree::BlockerTree;
 use super::convex_polygons::ConvexPolygon;
-use super::cubature::integrate_adaptively;
+use super::cubature::{MAX_CELLS, integrate_adaptively};
 use super::matrix::{Estimate, Factor};
 use super::pair_visibility::PairVisibility;
 use super::partial_matrix::{Exchange, Making, PolygonRow};
@@ -46,6 +46,10 @@ pub(super) fn make(
     Some(())
 }
 
+/// The error bound of a factor, as a share of the requested error. Its estimate is reduced to a
+/// tenth of that: rows of thousands of factors then close to a tenth of the requested error.
+pub(super) const BOUND_SHARE: f64 = 0.1;
+
 /// Data for computing the exchange of one polygon with others.
 pub(super) struct Assembler {
     /// Polygons that emit and receive, by group.
@@ -74,7 +78,7 @@ impl Assembler {
         let mut fronts: Vec<Exchange> = Vec::new();
         let group_area = self.areas[from.group as usize];
         // Errors of the polygons of a group are independent: squares add up.
-        let share = self.bound_share(from.area, from.group as usize);
+        let share = self.bound_share(from);
         let mut t = s + 1;
         for group in self.fronts[s + 1..].chunk_by(|a, b| a.group == b.group) {
             let to = group[0].group;
@@ -91,11 +95,14 @@ impl Assembler {
         PolygonRow { fronts, back: Exchange::new(0, back) }
     }
 
-    /// The error bound of a sum from a polygon of this `area` in `group`, as a share of the area of
-    /// the smaller group: a tenth of the requested error. Its estimate is reduced to a tenth of
-    /// that: rows of thousands of factors then close to a tenth of the requested error.
-    fn bound_share(&self, area: f64, group: usize) -> f64 {
-        0.1 * self.error * (area / self.areas[group]).sqrt()
+    /// The error bound of a sum from a polygon, as a share of the area of the smaller group.
+    fn bound_share(&self, from: &ConvexPolygon) -> f64 {
+        BOUND_SHARE * self.error * self.root_share(from)
+    }
+
+    /// The root of a polygon's share of the area of its group.
+    fn root_share(&self, polygon: &ConvexPolygon) -> f64 {
+        (polygon.area / self.areas[polygon.group as usize]).sqrt()
     }
 
     /// The factors of `group` to all groups, by ascending index, no zeros.
@@ -109,8 +116,7 @@ impl Assembler {
             let mut visibility = PointVisibility::default();
             let flux = |s: usize| {
                 let from = &self.fronts[s];
-                let share = self.bound_share(from.area, group);
-                let tolerance = share * self.areas[group].min(self.areas[to]);
+                let tolerance = self.bound_share(from) * self.areas[group].min(self.areas[to]);
                 let receivers = polygons(to).filter(|t| *t != s);
                 let receivers = receivers.map(|t| (&self.fronts[t], t));
                 self.flux(s, receivers, tolerance, &mut visibility)
@@ -145,10 +151,14 @@ impl Assembler {
                 PairVisibility::Occluded(pair) => occluded_pairs.push(*pair),
             }
         }
-        let occluded = integrate_adaptively(&mut occluded_pairs, tolerance, visibility);
+        let occluded = integrate_adaptively(&mut occluded_pairs, tolerance, MAX_CELLS, visibility);
+        // Errors of closed forms and of their cubature share a sign: over the polygons of a group
+        // they add up themselves, not their squares. Each divided by the root of its share of the
+        // area, the squares add up to that of the sum or more (Cauchy–Schwarz inequality).
+        let of_closed_forms = unoccluded.error / self.root_share(from);
         Estimate {
             value: unoccluded.value + occluded.value,
-            error: unoccluded.error.hypot(occluded.error),
+            error: of_closed_forms.hypot(occluded.error),
         }
     }
 }

@@ -51,6 +51,13 @@ pub(super) struct OccludedPair {
     pub cells: Vec<Cell>,
 }
 
+impl OccludedPair {
+    /// Blockers of all cells, and the number of cells.
+    pub fn blockers_and_cells(&self) -> [usize; 2] {
+        [self.cells.iter().map(|cell| cell.blockers.len()).sum(), self.cells.len()]
+    }
+}
+
 /// A triangle of the domain. Fluxes and errors are A₁F₁₂, in squares of the unit of length.
 pub(super) struct Cell {
     corners: [DVec3; 3],
@@ -262,11 +269,15 @@ impl SquaredErrors {
     }
 }
 
+/// Maximum number of cells of a sum: limits time and memory; the remaining error is reported.
+pub(super) const MAX_CELLS: usize = 40_000;
+
 /// The sum of A₁F₁₂ over all `pairs`: cells are cut until the error bound of the sum is at most
-/// `tolerance` and its estimate a tenth of that, or 40 000 cells are reached.
+/// `tolerance` and its estimate a tenth of that, or `max_cells` are reached.
 pub(super) fn integrate_adaptively(
     pairs: &mut [OccludedPair],
     tolerance: f64,
+    max_cells: usize,
     visibility: &mut PointVisibility,
 ) -> Estimate {
     let mut heap = BinaryHeap::new();
@@ -277,8 +288,7 @@ pub(super) fn integrate_adaptively(
             heap.push(cell.in_heap(pair, index));
         }
     }
-    // Limits time and memory; the remaining error is reported.
-    while !squared_errors.are_within(tolerance) && heap.len() < 40_000 {
+    while !squared_errors.are_within(tolerance) && heap.len() < max_cells {
         let Some((1.., Reverse((pair, cell)))) = heap.pop() else { break };
         let occluded = &mut pairs[pair];
         squared_errors.remove(&occluded.cells[cell]);

@@ -1,6 +1,6 @@
 //! What is printed of a matrix: its checks, and its factors.
 
-use radiosity::view_factor::{BackMet, ErrorStats, Estimate};
+use radiosity::view_factor::{BackMet, ErrorStats, Estimate, Missing};
 use radiosity::{Scene, ViewFactors};
 
 /// Groups in a warning at most.
@@ -30,11 +30,16 @@ pub fn print_checks(m: &ViewFactors) {
         say!("sums of rows: none above 1");
     }
     if let Some(&worst) = m.rows_over_unity().first() {
+        // Rays meet surfaces in one place once.
+        let cause = match m.absent {
+            Missing::Zero => "are two surfaces in one place?",
+            Missing::Unmet => "that is more than three of its standard errors, which are too small",
+        };
+        let (name, Estimate { value, error }) = (name(worst), m.open[worst]);
+        let excess = -value;
         eprintln!(
-            "warning: more than all of {}'s flux arrives, {:.3e} too much: are two surfaces in one \
-             place?",
-            name(worst),
-            -m.open[worst].value
+            "warning: more than all of {name}'s flux arrives, {excess:.3e} ± {error:.1e} too much: \
+             {cause}"
         );
     }
     print_losses(m);
