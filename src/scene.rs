@@ -285,6 +285,12 @@ impl Scene {
         self.covered_backs().of(t)
     }
 
+    /// Of triangles that cover one another's backs, those that come after one of theirs; and those
+    /// whose back others cover, but not they theirs.
+    pub(crate) fn second_sides(&self) -> Vec<usize> {
+        self.covered_backs().seconds()
+    }
+
     /// Of a translucent triangle `t`, the translucent ones whose fronts cover its back, from which
     /// its transmitted light leaves. None for others.
     pub(crate) fn other_side(&self, t: usize) -> impl Iterator<Item = usize> {

@@ -57,7 +57,8 @@ impl LightMap {
             missing.irradiance_two_sided(&point, self.near_paths[texel as usize], path)
         };
         let finest = TEXELS_OF_CELL * self.atlas.texel_size() / diagonal;
-        let Some(found) = missed_light(&places, finest, error, sample, progress) else {
+        let errors = [baked.estimate.of_light(), baked.estimate.total, error];
+        let Some(found) = missed_light(&places, finest, errors, sample, progress) else {
             return Ok(None);
         };
         for (k, &texel) in texels.iter().enumerate() {

@@ -8,15 +8,12 @@
 //!   └───────┴───┴─┴─┘   that a cell takes from its surroundings what its own samples lack.
 //! ```
 //!
-//! Variances s² and τ² are estimated from the samples: s² by their scatter within a cell, τ² by the
+//! Variances s² and τ² are estimated from the samples: s² by their scatter within cells, τ² by the
 //! scatter of cells within the cell around them beyond that (analysis of variance: Searle, Casella
 //! and McCulloch 1992).
 
 use glam::DVec3 as Value;
 use rustc_hash::FxHashMap;
-
-/// Samples of the surroundings that the scatter of a cell's own samples is worth as many as.
-const PRIOR_SAMPLES: f64 = 16.0;
 
 /// One sample of the value at an item.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +90,7 @@ impl NestedCells {
         NestedCells { cells, parents: self.parents[levels..].to_vec() }
     }
 
-    /// Levels below that of the cell around all items.
+    /// Number of levels below that of the cell around all items.
     pub fn levels(&self) -> usize {
         self.parents.len()
     }
@@ -133,24 +130,6 @@ impl NestedCells {
         }
         levels
     }
-
-    /// Variances of a sample, level by level from the finest: by the scatter within the cell and
-    /// that of the cell around it.
-    fn variances(&self, sums: &[Vec<Sums>]) -> Vec<Vec<f64>> {
-        let mut above = vec![sums[self.levels()][0].scatter().0];
-        let mut levels = vec![above.clone()];
-        for (sums, parent) in sums.iter().zip(&self.parents).rev() {
-            let of_cell = |(sums, &cell): (&Sums, &u32)| {
-                let (own, freedom) = sums.scatter();
-                let prior = PRIOR_SAMPLES * above[cell as usize];
-                (freedom * own + prior) / (freedom + PRIOR_SAMPLES)
-            };
-            above = sums.iter().zip(parent).map(of_cell).collect();
-            levels.push(above.clone());
-        }
-        levels.reverse();
-        levels
-    }
 }
 
 /// Numbers for `keys`, the same for the same key, and the keys by number.
@@ -177,11 +156,9 @@ impl Sums {
         self.sum / self.samples.max(1.0)
     }
 
-    /// Variance of a sample by the scatter of all, and its degrees of freedom.
-    fn scatter(&self) -> (f64, f64) {
-        let freedom = (self.samples - 1.0).max(0.0);
-        let squares = (self.squares - self.samples * self.mean().length_squared()).max(0.0);
-        (squares / freedom.max(1.0), freedom)
+    /// The sum of squared distances from the mean.
+    fn scatter(&self) -> f64 {
+        (self.squares - self.samples * self.mean().length_squared()).max(0.0)
     }
 }
 
@@ -189,43 +166,41 @@ impl Sums {
 pub(super) struct CellSamples<'a> {
     nested: &'a NestedCells,
     sums: Vec<Vec<Sums>>,
-    variances: Vec<Vec<f64>>,
+    /// Variance of a sample within a cell, level by level from the finest: one for all cells. Those
+    /// of single cells would favour cells that miss the rare bright samples, and with them values
+    /// that are too low.
+    variances: Vec<f64>,
 }
 
 impl<'a> CellSamples<'a> {
     /// Of items with these `areas`.
     pub fn new(nested: &'a NestedCells, samples: &[Sample], areas: &[f64]) -> CellSamples<'a> {
         let sums = nested.sums(samples, areas);
-        let variances = nested.variances(&sums);
+        let variance = |cells: &Vec<Sums>| {
+            let freedom: f64 = cells.iter().map(|cell| (cell.samples - 1.0).max(0.0)).sum();
+            cells.iter().map(Sums::scatter).sum::<f64>() / freedom.max(1.0)
+        };
+        let variances = sums.iter().map(variance).collect();
         CellSamples { nested, sums, variances }
-    }
-
-    /// Variance of a sample at `item`.
-    pub fn variance(&self, item: usize) -> f64 {
-        self.variances[0][self.nested.cells[item] as usize]
     }
 
     /// Adds the sums for τ² of each level to `spreads`, from the finest.
     pub fn add_spreads(&self, spreads: &mut [SpreadSums]) {
         for (l, spread) in spreads.iter_mut().enumerate() {
             let mut own = vec![SpreadSums::default(); self.sums[l + 1].len()];
-            for (j, (sums, &cell)) in self.sums[l].iter().zip(&self.nested.parents[l]).enumerate() {
+            let variance = self.variances[l];
+            for (sums, &cell) in self.sums[l].iter().zip(&self.nested.parents[l]) {
                 let around = &self.sums[l + 1][cell as usize];
                 let (off, share) = (sums.mean() - around.mean(), sums.samples / around.samples);
                 if sums.samples > 0.0 {
                     let own = &mut own[cell as usize];
-                    own.excess +=
-                        sums.samples * off.length_squared() - self.variances[l][j] * (1.0 - share);
+                    own.excess += sums.samples * off.length_squared() - variance * (1.0 - share);
                     own.weight += sums.samples * (1.0 - share);
-                    own.variance += 2.0 * self.variances[l][j].powi(2) * (1.0 - share);
+                    own.variance += 2.0 * variance * variance * (1.0 - share);
                 }
             }
-            // Cells count by area, however many samples they have.
             for (own, around) in own.iter().zip(&self.sums[l + 1]) {
-                let share = around.area / around.samples.max(1.0);
-                spread.excess += share * own.excess;
-                spread.weight += share * own.weight;
-                spread.variance += share * share * own.variance;
+                spread.add(around, own.excess, own.weight, own.variance);
             }
         }
     }
@@ -247,12 +222,14 @@ impl<'a> CellSamples<'a> {
     /// What the samples of each cell alone say of it, level by level from the finest; of infinite
     /// variance without a sample.
     fn filtered(&self, spreads: &[f64]) -> Vec<Vec<Estimate>> {
-        let finest = |(sums, &variance): (&Sums, &f64)| Estimate {
+        let finest = |sums: &Sums| Estimate {
             value: sums.mean(),
-            variance: if sums.samples > 0.0 { variance / sums.samples } else { f64::INFINITY },
+            variance: match sums.samples > 0.0 {
+                true => self.variances[0] / sums.samples,
+                false => f64::INFINITY,
+            },
         };
-        let mut levels: Vec<Vec<Estimate>> =
-            vec![self.sums[0].iter().zip(&self.variances[0]).map(finest).collect()];
+        let mut levels: Vec<Vec<Estimate>> = vec![self.sums[0].iter().map(finest).collect()];
         for (l, parent) in self.nested.parents.iter().enumerate() {
             let mut sums = vec![(Value::ZERO, 0.0); self.sums[l + 1].len()];
             for (own, &cell) in levels[l].iter().zip(parent) {
@@ -289,6 +266,14 @@ impl Estimate {
 }
 
 impl SpreadSums {
+    /// Adds those of a cell: cells count by area, however many samples they have.
+    fn add(&mut self, cell: &Sums, excess: f64, weight: f64, variance: f64) {
+        let share = cell.area / cell.samples.max(1.0);
+        self.excess += share * excess;
+        self.weight += share * weight;
+        self.variance += share * share * variance;
+    }
+
     /// τ², and its variance; `parts` are sums that the same samples are in.
     pub fn spread(&self, parts: f64) -> [f64; 2] {
         let weight = self.weight.max(f64::MIN_POSITIVE);

@@ -20,16 +20,16 @@ use crate::scene::Rgb;
 /// Sets of cells: the edges of one show with an eighth of its steps.
 const SETS: usize = 8;
 
-/// Paths of a finest cell: its scatter is that of its surroundings before.
+/// Mean number of paths of a finest cell, at least. Plain choice.
 const PATHS_OF_CELL: usize = 32;
 
 /// Paths of the first round, and the maximum. The first bring what all points miss in common to
-/// 2 % of itself where paths scatter by 2.5 times their mean; the last take 128 MiB.
-const PATHS: [usize; 2] = [1 << 14, 1 << 23];
+/// 1 % of itself where paths scatter by 2.5 times their mean; the last take 128 MiB.
+const PATHS: [usize; 2] = [1 << 16, 1 << 23];
 
 /// Position over the diagonal of the scene, normal and octave of light in the space of cells: two
 /// normals a radian apart are as far from each other as two points half of the diagonal apart, and
-/// so is light of 1 and 16. Cells are as good with twice or half as much.
+/// so is light of 1 and 16. Plain choices; no recorded measurement.
 const SHARE_OF_NORMAL: f64 = 0.5;
 const SHARE_OF_OCTAVE: f64 = 0.125;
 
@@ -67,32 +67,29 @@ struct Paths<'a> {
 }
 
 /// What is missed at `places`, by paths whose number grows until the root mean square over area of
-/// standard errors is at most `error`, or there are as many as can be. The edge of the finest cells
-/// is `finest` to twice that, over the diagonal of the scene. `sample` gives what path number
-/// `path` finds missing at a place, W/m², without bias. None where `progress`, as in
-/// [`super::correct_by_paths`], stops the work.
+/// standard errors is at most `error`, or there are as many as can be. By an estimate beforehand
+/// the root mean square of what is missed is `expected` and surely less than a `bound`, which hold
+/// as far as paths do not contradict. The edge of the finest cells is `finest` to twice that, over
+/// the diagonal of the scene. `sample` gives what path number `path` finds missing at a place,
+/// W/m², without bias. None where `progress`, as in [`super::correct_by_paths`], stops the work.
 pub(crate) fn missed_light(
     places: &[Place],
     finest: f64,
-    error: f64,
+    [expected, bound, error]: [f64; 3],
     sample: impl Fn(usize, usize) -> Rgb + Sync,
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Option<MissedLight> {
     let mut paths = Paths::new(places, finest);
-    let mut weights = paths.areas.clone();
     let mut count = PATHS[0];
     loop {
         let report = |done: usize| progress(done, count);
-        if paths.trace(count, &weights, &sample, report).is_break() {
+        if paths.trace(count, &sample, report).is_break() {
             return None;
         }
-        let (missed, variances) = paths.missed();
+        let missed = paths.missed([expected, bound]);
         if missed.error <= error || count >= PATHS[1] {
             return Some(missed);
         }
-        // The number of paths in proportion to their scatter makes the mean of variances least
-        // (Neyman 1934).
-        weights = variances.iter().zip(&paths.areas).map(|(v, area)| v.sqrt() * area).collect();
         count *= 2;
     }
 }
@@ -120,16 +117,15 @@ impl Paths<'_> {
         Paths { places, areas, order: sets[0].order(), sets, samples: vec![] }
     }
 
-    /// Traces until there are `count` paths, in proportion to `weights` of places. `progress` gets
-    /// the number of all.
+    /// Traces until there are `count` paths, in proportion to area. `progress` gets the number of
+    /// all.
     fn trace(
         &mut self,
         count: usize,
-        weights: &[f64],
         sample: &(impl Fn(usize, usize) -> Rgb + Sync),
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let along = AreaSampler::new(self.order.iter().map(|&item| weights[item as usize]));
+        let along = AreaSampler::new(self.order.iter().map(|&item| self.areas[item as usize]));
         let (first, round) = (self.samples.len(), radical_inverse(self.samples.len() as u32 + 1));
         let numbers: Vec<usize> = (first..count).collect();
         let (mut remaining, mut batches) = (&numbers[..], BatchSizer::new(1024));
@@ -150,8 +146,8 @@ impl Paths<'_> {
         ControlFlow::Continue(())
     }
 
-    /// What is missed, and the variance of a sample at each place.
-    fn missed(&self) -> (MissedLight, Vec<f64>) {
+    /// What is missed, where so much was `expected`, and at most the second of both.
+    fn missed(&self, expected: [f64; 2]) -> MissedLight {
         let most = self.samples.len() / PATHS_OF_CELL;
         let (first, last) = (&self.sets[0], self.sets[0].levels() - 1);
         let left_out = (0..last).find(|&l| first.count(l) <= most).unwrap_or(last);
@@ -159,7 +155,7 @@ impl Paths<'_> {
             self.sets.par_iter().map(|set| set.coarsened(left_out)).collect();
         let of_set = |set| CellSamples::new(set, &self.samples, &self.areas);
         let samples: Vec<CellSamples> = sets.par_iter().map(of_set).collect();
-        let (spreads, uncertainty) = spreads(&sets, &samples);
+        let (spreads, uncertainty) = spreads(&samples, sets[0].levels(), expected);
         let estimates: Vec<Vec<Estimate>> =
             samples.par_iter().map(|samples| samples.estimates(&spreads)).collect();
         let share = 1.0 / SETS as f64;
@@ -177,17 +173,28 @@ impl Paths<'_> {
         let all: f64 = self.areas.iter().sum();
         let square: f64 = variance.iter().zip(&self.areas).map(|(v, area)| v * area).sum();
         let error = (square / all.max(f64::MIN_POSITIVE)).sqrt();
-        let variances = (0..self.places.len()).map(|item| samples[0].variance(item)).collect();
-        (MissedLight { missed, variance, error }, variances)
+        MissedLight { missed, variance, error }
     }
 }
 
-/// τ² of each level, by the samples of all sets, and one standard error of their sum: it is in the
-/// errors of values, since too small spreads would hide errors.
-fn spreads(sets: &[NestedCells], samples: &[CellSamples]) -> (Vec<f64>, f64) {
-    let mut sums = vec![SpreadSums::default(); sets[0].levels()];
+/// τ² of each level, by the samples of all sets of cells. Their sum is the square of what is
+/// `expected`, within a standard error of that by the samples. And by how much it may be more: it
+/// is at most the square of the `bound`, within the same.
+fn spreads(samples: &[CellSamples], levels: usize, [expected, bound]: [f64; 2]) -> (Vec<f64>, f64) {
+    let mut sums = vec![SpreadSums::default(); levels];
     samples.iter().for_each(|samples| samples.add_spreads(&mut sums));
-    let spreads = sums.iter().map(|sums| sums.spread(sets.len() as f64));
-    let variance: f64 = spreads.clone().map(|[_, variance]| variance).sum();
-    (spreads.map(|[spread, _]| spread).collect(), variance.sqrt())
+    let spreads: Vec<[f64; 2]> =
+        sums.iter().map(|sums| sums.spread(samples.len() as f64)).collect();
+    let [sum, variance] = [0, 1].map(|k| spreads.iter().map(|spread| spread[k]).sum::<f64>());
+    let within = |square: f64| {
+        let error = variance.sqrt();
+        square.clamp((sum - error).max(0.0), sum + error)
+    };
+    let [wanted, most] = [expected, bound].map(|missed| within(missed * missed));
+    let adjusted = |[spread, own]: &[f64; 2]| match wanted < sum {
+        true => spread * wanted / sum,
+        // The least sum of squares of changes over their standard errors.
+        false => spread + (wanted - sum) * own / variance.max(f64::MIN_POSITIVE),
+    };
+    (spreads.iter().map(adjusted).collect(), (most - wanted).max(0.0))
 }

@@ -34,7 +34,7 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let surfaces = Surfaces { scene, corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
         (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
-    Covers((0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))).collect())
+    Covers::new((0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))))
 }
 
 /// Triangles by the positions of their corners.

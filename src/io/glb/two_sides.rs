@@ -55,10 +55,12 @@ impl TwoSides {
     pub fn of_light(light: &GatheredMesh, error: f64) -> TwoSides {
         let (scene, mut sides) = (light.mesh.scene(), TwoSides::default());
         let sheets = sheets(scene);
-        let points = sample_points(light, &sheets);
+        let twins = twins(scene, &sheets);
+        let points = sample_points(light, &twins);
         for sheet in &sheets {
-            let twins: Option<Vec<usize>> = sheet.iter().map(|&s| twin(scene, s)).collect();
-            match twins.filter(|twins| has_equal_light(light, [sheet, twins], &points, error)) {
+            let of_sheet: Option<Vec<usize>> =
+                sheet.iter().map(|s| twins.get(s).copied()).collect();
+            match of_sheet.filter(|twins| has_equal_light(light, [sheet, twins], &points, error)) {
                 Some(twins) => {
                     sides.omitted.extend(sheet);
                     sides.double_sided.extend(twins);
@@ -96,7 +98,6 @@ impl TwoSides {
     fn move_apart(&mut self, scene: &Scene, sheet: &[usize]) {
         let bounds = Aabb::from_points(sheet.iter().flat_map(|&s| scene.corners(s)));
         let gap = (GAP * scene.bounds().diagonal()).min(LARGEST_GAP * bounds.diagonal());
-        let bits = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
         let mut directions: FxHashMap<[u64; 3], DVec3> = FxHashMap::default();
         for &s in sheet {
             for corner in scene.corners(s) {
@@ -113,11 +114,7 @@ impl TwoSides {
 /// Of triangles in one place, those whose light shines the other way: in connected surfaces, in
 /// their order.
 fn sheets(scene: &Scene) -> Vec<Vec<usize>> {
-    let is_second = |&s: &usize| {
-        let is_first = |t: usize| scene.back_covers(t).contains(&(s as u32)) && s < t;
-        scene.back_covers(s).iter().any(|&t| !is_first(t as usize))
-    };
-    let seconds: Vec<usize> = (0..scene.triangles().len()).filter(is_second).collect();
+    let seconds = scene.second_sides();
     if seconds.is_empty() {
         return vec![];
     }
@@ -135,26 +132,50 @@ fn sheets(scene: &Scene) -> Vec<Vec<usize>> {
     sheets.into_values().collect()
 }
 
-/// The triangle of which triangle `s` is the other side, if there is one of the same corners, group
-/// and look.
-fn twin(scene: &Scene, s: usize) -> Option<usize> {
-    let [a, b, c] = scene.corners(s);
+/// Of triangles the one of which each is the other side: of the same corners, group and look.
+fn twins(scene: &Scene, sheets: &[Vec<usize>]) -> FxHashMap<usize, usize> {
+    let ascending = |t: usize| {
+        let mut corners = scene.corners(t).map(bits);
+        corners.sort_unstable();
+        corners
+    };
+    let mut by_corners: FxHashMap<_, Vec<usize>> = FxHashMap::default();
+    for &s in sheets.iter().flatten() {
+        by_corners.entry(ascending(s)).or_default();
+    }
+    for t in 0..scene.triangles().len() {
+        if let Some(triangles) = by_corners.get_mut(&ascending(t)) {
+            triangles.push(t);
+        }
+    }
     let look = |k: usize| {
         let (triangle, material) = (scene.triangles()[k], scene.material(k));
         (triangle.group, &material.name, material.reflectance, material.exitance)
     };
-    let is_twin = |&t: &usize| {
-        let has_corners = [[a, c, b], [c, b, a], [b, a, c]].contains(&scene.corners(t));
-        has_corners && look(s) == look(t) && scene.back_covers(t).contains(&(s as u32))
+    let covers = |s: usize, t: usize| scene.back_covers(s).binary_search(&(t as u32)).is_ok();
+    let twin = |&s: &usize| {
+        let [a, b, c] = scene.corners(s);
+        let is_twin = |&&t: &&usize| {
+            let has_corners = [[a, c, b], [c, b, a], [b, a, c]].contains(&scene.corners(t));
+            has_corners && look(s) == look(t) && covers(s, t) && covers(t, s)
+        };
+        Some((s, *by_corners[&ascending(s)].iter().find(is_twin)?))
     };
-    scene.back_covers(s).iter().map(|&t| t as usize).find(is_twin)
+    sheets.iter().flatten().filter_map(twin).collect()
 }
 
-/// The positions of vertices on the triangles of `sheets` and on their twins.
-fn sample_points(light: &GatheredMesh, sheets: &[Vec<usize>]) -> FxHashMap<usize, Vec<DVec3>> {
+/// Coordinates as a key.
+fn bits(position: DVec3) -> [u64; 3] {
+    (position + DVec3::ZERO).to_array().map(f64::to_bits)
+}
+
+/// The positions of vertices on triangles that are twins, by triangle.
+fn sample_points(
+    light: &GatheredMesh,
+    twins: &FxHashMap<usize, usize>,
+) -> FxHashMap<usize, Vec<DVec3>> {
     let (surface, mesh) = (&light.surface, &light.mesh);
-    let seconds = sheets.iter().flatten().copied();
-    let of_both = seconds.flat_map(|s| [Some(s), twin(mesh.scene(), s)]).flatten();
+    let of_both = twins.iter().flat_map(|(&s, &t)| [s, t]);
     let mut points: FxHashMap<usize, Vec<DVec3>> = of_both.map(|t| (t, vec![])).collect();
     if points.is_empty() {
         return points;
