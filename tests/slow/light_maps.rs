@@ -23,6 +23,7 @@ fn light_map_is_as_exact_as_asked() {
         let texels = map.irradiance.len();
         println!("asked {error}, off by {rms:.4} and told {told:.4} as {texels} texels show it");
         assert!(rms <= error && told <= error);
-        assert!((0.5..2.0).contains(&(told / rms)));
+        // An upper estimate: of the light it has what the bake as a whole may be off by.
+        assert!((0.5..3.0).contains(&(told / rms)));
     }
 }
