@@ -76,7 +76,8 @@ impl LightMap {
     fn scales(&self, texels: &[u32], measure: Measure) -> Vec<f64> {
         let sizes = texels.iter().map(|&texel| self.irradiance[texel as usize].length());
         let mean = sizes.clone().sum::<f64>() / (texels.len() as f64).max(1.0);
-        let floor = (measure.floor * mean).max(f64::MIN_POSITIVE);
+        // Where nothing arrived, what paths find is taken as it is.
+        let floor = if mean > 0.0 { measure.floor * mean } else { 1.0 };
         sizes.map(|size| size.max(floor)).collect()
     }
 }

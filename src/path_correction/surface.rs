@@ -79,6 +79,9 @@ pub(crate) fn missed_light(
     sample: impl Fn(usize, usize) -> Rgb + Sync,
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Option<MissedLight> {
+    if places.is_empty() {
+        return Some(MissedLight { missed: vec![], variance: vec![], error: 0.0 });
+    }
     let mut paths = Paths::new(places, finest);
     let mut count = PATHS[0];
     loop {
