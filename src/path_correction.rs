@@ -25,8 +25,10 @@
 //! good, τ is small and few paths do; where it is not, w goes to 1 and the value to that of the
 //! paths alone. Points whose error is too large get twice as many paths until it is not.
 
+#[cfg(feature = "light-map")]
 mod nested_cells;
 mod shrinkage;
+#[cfg(feature = "light-map")]
 mod surface;
 
 use std::ops::ControlFlow;
@@ -36,7 +38,6 @@ use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::near_surface::is_near;
-use crate::gather::two_sided::TwoSidedPoint;
 use crate::gather::{GatherPoint, GatheredMesh, PointIrradiance, RadiosityField};
 use crate::light::PathTracer;
 use crate::progress::BatchSizer;
@@ -45,6 +46,7 @@ use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 use shrinkage::{Missed, Shrinkage};
+#[cfg(feature = "light-map")]
 pub(crate) use surface::{Place, missed_light};
 
 /// Paths of all points in the first round: bring what they miss in common to 1 % of itself where
@@ -261,23 +263,6 @@ impl MissingLight<'_> {
         let is_known = |hit: &Hit| !near_paths || !is_near(self.field.mesh, hit);
         let known = |hit: &Hit| self.field.reflected_at(hit.triangle, hit.u, hit.v);
         self.tracer.missed([position, direction], near, is_known, known, &mut rng)
-    }
-
-    /// Irradiance that is missed at a point of a surface, by path number `path`, W/m². With
-    /// `near_paths` what near surfaces reflect is not the field's, as in
-    /// [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
-    pub fn irradiance_two_sided(
-        &self,
-        point: &TwoSidedPoint,
-        near_paths: bool,
-        path: usize,
-    ) -> Rgb {
-        let [own, other] = point.shares();
-        let front = own * self.irradiance_past(&point.point, near_paths, path);
-        if other == Rgb::ZERO {
-            return front;
-        }
-        front + other * self.irradiance_past(&point.other_side(), near_paths, path)
     }
 
     /// What is missed of the radiosity that is seen from `position` along unit `direction`, further

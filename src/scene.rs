@@ -287,6 +287,7 @@ impl Scene {
 
     /// Of triangles that cover one another's backs, those that come after one of theirs; and those
     /// whose back others cover, but not they theirs.
+    #[cfg(feature = "glb")]
     pub(crate) fn second_sides(&self) -> Vec<usize> {
         self.covered_backs().seconds()
     }

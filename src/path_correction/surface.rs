@@ -10,7 +10,9 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::MissingLight;
 use super::nested_cells::{CellSamples, Estimate, NestedCells, Sample, SpreadSums};
+use crate::gather::two_sided::TwoSidedPoint;
 use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::radical_inverse;
 use crate::sampling::random::random_numbers;
@@ -54,6 +56,25 @@ pub(crate) struct MissedLight {
     pub variance: Vec<f64>,
     /// Root mean square of the standard errors over area.
     pub error: f64,
+}
+
+impl MissingLight<'_> {
+    /// Irradiance that is missed at a point of a surface, by path number `path`, W/m². With
+    /// `near_paths` what near surfaces reflect is not the field's, as in
+    /// [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
+    pub fn irradiance_two_sided(
+        &self,
+        point: &TwoSidedPoint,
+        near_paths: bool,
+        path: usize,
+    ) -> Rgb {
+        let [own, other] = point.shares();
+        let front = own * self.irradiance_past(&point.point, near_paths, path);
+        if other == Rgb::ZERO {
+            return front;
+        }
+        front + other * self.irradiance_past(&point.other_side(), near_paths, path)
+    }
 }
 
 /// The paths so far.

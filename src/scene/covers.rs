@@ -48,6 +48,7 @@ impl Covers {
 
     /// Of triangles that cover one another, those that come after one of theirs, ascending, and
     /// those that are covered by others alone.
+    #[cfg(any(feature = "glb", test))]
     pub fn seconds(&self) -> Vec<usize> {
         // Of each list the lists of its members, or none where one is open.
         let lists_of_members: Vec<Vec<Option<u32>>> = self
