@@ -47,7 +47,7 @@ use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
 use shrinkage::{Missed, Shrinkage};
 #[cfg(feature = "light-map")]
-pub(crate) use surface::{Place, missed_light};
+pub(crate) use surface::{PathOrigin, missed_light};
 
 /// Paths of all points in the first round: bring what they miss in common to 1 % of itself where
 /// paths scatter by 2.5 times their mean.

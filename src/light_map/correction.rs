@@ -7,7 +7,7 @@ use super::texel_points::TexelPoints;
 use crate::accuracy::Measure;
 use crate::bake::BakeResult;
 use crate::error::Error;
-use crate::path_correction::{MissingLight, Place, missed_light};
+use crate::path_correction::{MissingLight, PathOrigin, missed_light};
 
 /// Edge of the finest cells over which texels share paths, in texels.
 const TEXELS_OF_CELL: f64 = 4.0;
@@ -40,16 +40,16 @@ impl LightMap {
         let scene = self.atlas.scene();
         let (origin, diagonal) = (scene.bounds().low, scene.bounds().diagonal());
         let triangle = |texel: u32| self.triangles[texel as usize] as usize;
-        let place = |(&texel, &scale): (&u32, &f64)| {
+        let origin_of = |(&texel, &scale): (&u32, &f64)| {
             let point = points.point(texel, triangle(texel)).point;
-            Place {
+            PathOrigin {
                 position: (point.position - origin) / diagonal,
                 normal: point.normal,
                 scale,
                 area: points.texel_size(triangle(texel)).powi(2),
             }
         };
-        let places: Vec<Place> = texels.iter().zip(&scales).map(place).collect();
+        let origins: Vec<PathOrigin> = texels.iter().zip(&scales).map(origin_of).collect();
         let missing = MissingLight::new(&baked.light);
         let sample = |k: usize, path: usize| {
             let texel = texels[k];
@@ -58,7 +58,7 @@ impl LightMap {
         };
         let finest = TEXELS_OF_CELL * self.atlas.texel_size() / diagonal;
         let errors = [baked.estimate.of_light(), baked.estimate.total, error];
-        let Some(found) = missed_light(&places, finest, errors, sample, progress) else {
+        let Some(found) = missed_light(&origins, finest, errors, sample, progress) else {
             return Ok(None);
         };
         for (k, &texel) in texels.iter().enumerate() {

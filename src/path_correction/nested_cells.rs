@@ -15,6 +15,9 @@
 use glam::DVec3 as Value;
 use rustc_hash::FxHashMap;
 
+/// Samples of a class whose own variance counts as much as that of all. Plain choice.
+const SAMPLES_OF_CLASS: f64 = 32.0;
+
 /// One sample of the value at an item.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
@@ -46,6 +49,8 @@ struct Sums {
     squares: f64,
     /// Of the items of the cell.
     area: f64,
+    /// Of the variances of its samples.
+    noise: f64,
 }
 
 /// Sums for τ² of one level.
@@ -106,18 +111,21 @@ impl NestedCells {
         order
     }
 
-    /// Sums over samples, level by level from the finest.
-    fn sums(&self, samples: &[Sample], areas: &[f64]) -> Vec<Vec<Sums>> {
+    /// Sums over samples, level by level from the finest. `noise` is the variance of a sample.
+    fn sums(
+        &self,
+        samples: &[Sample],
+        areas: &[f64],
+        noise: impl Fn(&Sample) -> f64,
+    ) -> Vec<Vec<Sums>> {
         let mut finest = vec![Sums::default(); self.count(0)];
         for (&cell, area) in self.cells.iter().zip(areas) {
             finest[cell as usize].area += area;
         }
         for sample in samples {
-            let value = Value::from_array(sample.value.map(f64::from));
             let sums = &mut finest[self.cells[sample.item as usize] as usize];
-            sums.samples += 1.0;
-            sums.sum += value;
-            sums.squares += value.length_squared();
+            sums.add_sample(sample);
+            sums.noise += noise(sample);
         }
         let mut levels = vec![finest];
         for (l, parent) in self.parents.iter().enumerate() {
@@ -145,11 +153,19 @@ fn numbered<const N: usize>(keys: impl Iterator<Item = [i32; N]>) -> (Vec<u32>, 
 }
 
 impl Sums {
+    fn add_sample(&mut self, sample: &Sample) {
+        let value = Value::from_array(sample.value.map(f64::from));
+        self.samples += 1.0;
+        self.sum += value;
+        self.squares += value.length_squared();
+    }
+
     fn add(&mut self, other: &Sums) {
         self.samples += other.samples;
         self.sum += other.sum;
         self.squares += other.squares;
         self.area += other.area;
+        self.noise += other.noise;
     }
 
     fn mean(&self) -> Value {
@@ -162,37 +178,75 @@ impl Sums {
     }
 }
 
+/// Variance of a sample within cells.
+fn variance_within<'a>(cells: impl IntoIterator<Item = &'a Sums>) -> f64 {
+    let (mut scatter, mut freedom) = (0.0, 0.0);
+    for cell in cells {
+        scatter += cell.scatter();
+        freedom += (cell.samples - 1.0).max(0.0);
+    }
+    scatter / f64::max(freedom, 1.0)
+}
+
+/// Variance of a sample within the finest cells by the class of its item, from 0. Classes of few
+/// samples have that of all.
+fn noise(nested: &NestedCells, samples: &[Sample], classes: &[u32]) -> Vec<f64> {
+    let count = classes.iter().max().map_or(0, |&class| class as usize + 1);
+    let mut cells = vec![FxHashMap::<u32, Sums>::default(); count];
+    for sample in samples {
+        let (class, cell) = (classes[sample.item as usize], nested.cells[sample.item as usize]);
+        cells[class as usize].entry(cell).or_default().add_sample(sample);
+    }
+    let of_all = variance_within(cells.iter().flat_map(FxHashMap::values));
+    let of_class = |cells: &FxHashMap<u32, Sums>| {
+        let samples: f64 = cells.values().map(|sums| sums.samples).sum();
+        let own = samples / (samples + SAMPLES_OF_CLASS);
+        own * variance_within(cells.values()) + (1.0 - own) * of_all
+    };
+    cells.iter().map(of_class).collect()
+}
+
 /// What samples say of nested cells.
 pub(super) struct CellSamples<'a> {
     nested: &'a NestedCells,
     sums: Vec<Vec<Sums>>,
-    /// Variance of a sample within a cell, level by level from the finest: one for all cells. Those
-    /// of single cells would favour cells that miss the rare bright samples, and with them values
-    /// that are too low.
-    variances: Vec<f64>,
+    /// Variance of a sample by the class of its item: one for all cells. Those of single cells
+    /// would favour cells that miss the rare bright samples, and with them values that are too low.
+    pub noise: Vec<f64>,
+    /// What cells within a cell add to that, level by level from the finest.
+    excess: Vec<f64>,
 }
 
 impl<'a> CellSamples<'a> {
-    /// Of items with these `areas`.
-    pub fn new(nested: &'a NestedCells, samples: &[Sample], areas: &[f64]) -> CellSamples<'a> {
-        let sums = nested.sums(samples, areas);
-        let variance = |cells: &Vec<Sums>| {
-            let freedom: f64 = cells.iter().map(|cell| (cell.samples - 1.0).max(0.0)).sum();
-            cells.iter().map(Sums::scatter).sum::<f64>() / freedom.max(1.0)
-        };
-        let variances = sums.iter().map(variance).collect();
-        CellSamples { nested, sums, variances }
+    /// Of items with these `areas` and `classes`, from 0, within which samples scatter alike.
+    pub fn new(
+        nested: &'a NestedCells,
+        samples: &[Sample],
+        areas: &[f64],
+        classes: &[u32],
+    ) -> CellSamples<'a> {
+        let noise = noise(nested, samples, classes);
+        let of_sample = |sample: &Sample| noise[classes[sample.item as usize] as usize];
+        let sums = nested.sums(samples, areas, of_sample);
+        let variances: Vec<f64> = sums.iter().map(|cells| variance_within(cells)).collect();
+        let excess = variances.iter().map(|variance| (variance - variances[0]).max(0.0)).collect();
+        CellSamples { nested, sums, noise, excess }
+    }
+
+    /// Variance of a sample within a cell of a level.
+    fn variance(&self, level: usize, cell: &Sums) -> f64 {
+        cell.noise / cell.samples.max(1.0) + self.excess[level]
     }
 
     /// Adds the sums for τ² of each level to `spreads`, from the finest.
     pub fn add_spreads(&self, spreads: &mut [SpreadSums]) {
         for (l, spread) in spreads.iter_mut().enumerate() {
             let mut own = vec![SpreadSums::default(); self.sums[l + 1].len()];
-            let variance = self.variances[l];
             for (sums, &cell) in self.sums[l].iter().zip(&self.nested.parents[l]) {
                 let around = &self.sums[l + 1][cell as usize];
                 let (off, share) = (sums.mean() - around.mean(), sums.samples / around.samples);
                 if sums.samples > 0.0 {
+                    let variance = self.variance(l, sums);
                     let own = &mut own[cell as usize];
                     own.excess += sums.samples * off.length_squared() - variance * (1.0 - share);
                     own.weight += sums.samples * (1.0 - share);
@@ -225,7 +279,7 @@ impl<'a> CellSamples<'a> {
         let finest = |sums: &Sums| Estimate {
             value: sums.mean(),
             variance: match sums.samples > 0.0 {
-                true => self.variances[0] / sums.samples,
+                true => self.variance(0, sums) / sums.samples,
                 false => f64::INFINITY,
             },
         };
@@ -287,50 +341,54 @@ mod tests {
     use crate::sampling::random::{normal_deviate, random_numbers};
 
     /// 64 × 64 items in cells that differ from those around them by normal deviates, and samples
-    /// that scatter by 3: estimates are as far off as they say, less than means of samples are, and
-    /// less than the mean of all.
+    /// that scatter by 1 or 3 by the half that they are in: estimates of either are as far off as
+    /// they say, less than means of samples are, and less than the mean of all.
     #[test]
     fn errors_are_those_that_are_stated() {
         let points: Vec<[f32; 2]> =
             (0..64 * 64).map(|k| [k % 64, k / 64].map(|x| (x as f32 + 0.5) / 64.0)).collect();
         let nested = NestedCells::new(&points, 4, [0.0; 2]);
         let areas = vec![1.0; points.len()];
+        let classes: Vec<u32> = points.iter().map(|point| u32::from(point[0] > 0.5)).collect();
+        let mut class_of = vec![0; nested.count(0)];
+        nested.cells.iter().zip(&classes).for_each(|(&cell, &k)| class_of[cell as usize] = k);
         for deviations in [[0.0, 0.0, 0.0, 0.3], [0.5, 0.3, 0.2, 0.1], [0.1, 0.2, 0.3, 0.5]] {
-            let (mut squares, mut stated, mut of_means, mut of_all) = (0.0, 0.0, 0.0, 0.0);
+            let [mut squares, mut stated, mut of_means, mut of_all] = [[0.0; 2]; 4];
             for trial in 0..40 {
                 let mut rng = random_numbers(&[trial]);
                 let truth = cells_that_differ(&nested, deviations, &mut rng);
                 let sample = |k: usize| {
                     let item = (k % points.len()) as u32;
                     let value = truth[nested.cells[item as usize] as usize];
-                    let noise = 3.0 * normal_deviate(&mut rng);
+                    let scatter = [1.0, 3.0][classes[item as usize] as usize];
+                    let noise = scatter * normal_deviate(&mut rng);
                     Sample { item, value: [(value + noise) as f32, 0.0, 0.0] }
                 };
                 let samples: Vec<Sample> = (0..4 * points.len()).map(sample).collect();
-                let cells = CellSamples::new(&nested, &samples, &areas);
+                let cells = CellSamples::new(&nested, &samples, &areas, &classes);
                 let mut sums = vec![SpreadSums::default(); nested.levels()];
                 cells.add_spreads(&mut sums);
                 let spreads: Vec<f64> = sums.iter().map(|sums| sums.spread(1.0)[0]).collect();
                 let all = cells.sums[nested.levels()][0].mean().x;
                 for (j, estimate) in cells.estimates(&spreads).iter().enumerate() {
-                    squares += (estimate.value.x - truth[j]).powi(2);
-                    stated += estimate.variance;
-                    of_means += (cells.sums[0][j].mean().x - truth[j]).powi(2);
-                    of_all += (all - truth[j]).powi(2);
+                    let class = class_of[j] as usize;
+                    squares[class] += (estimate.value.x - truth[j]).powi(2);
+                    stated[class] += estimate.variance;
+                    of_means[class] += (cells.sums[0][j].mean().x - truth[j]).powi(2);
+                    of_all[class] += (all - truth[j]).powi(2);
                 }
             }
-            // Of some 10 000 deviations, of which those of a trial have its spreads in common.
-            // Where cells do not differ, spreads are above 0 by noise alone, and stated all the
-            // same.
-            let ratio = (squares / stated).sqrt();
-            println!(
-                "{deviations:?}: {ratio:.3} {:.3} {:.3}",
-                squares / of_means,
-                squares / of_all
-            );
+            // Of some 5 000 deviations, of which those of a trial have its spreads in common. Where
+            // cells do not differ, spreads are above 0 by noise alone, and stated all the same.
             let least = if deviations[0] > 0.0 { 0.9 } else { 0.5 };
-            assert!(ratio > least && ratio < 1.1, "{deviations:?}: {ratio}");
-            assert!(squares < 0.9 * of_means && squares < 0.5 * of_all, "{deviations:?}");
+            for class in 0..2 {
+                let ratio = (squares[class] / stated[class]).sqrt();
+                let of_means = squares[class] / of_means[class];
+                let of_all = squares[class] / of_all[class];
+                println!("{deviations:?} {class}: {ratio:.3} {of_means:.3} {of_all:.3}");
+                assert!(ratio > least && ratio < 1.1, "{deviations:?} {class}: {ratio}");
+                assert!(of_means < 1.0 && of_all < 1.0, "{deviations:?} {class}");
+            }
         }
     }
 

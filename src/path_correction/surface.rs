@@ -35,9 +35,9 @@ const PATHS: [usize; 2] = [1 << 16, 1 << 23];
 const SHARE_OF_NORMAL: f64 = 0.5;
 const SHARE_OF_OCTAVE: f64 = 0.125;
 
-/// A point of a surface.
+/// A point of a surface that paths start from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct PathOrigin {
     /// Over the diagonal of the scene, from its corner: in [0, 1].
     pub position: DVec3,
     /// Unit normal.
@@ -79,31 +79,35 @@ impl MissingLight<'_> {
 
 /// The paths so far.
 struct Paths<'a> {
-    places: &'a [Place],
+    origins: &'a [PathOrigin],
     areas: Vec<f64>,
+    /// Octave of the scale of each, from the darkest.
+    octaves: Vec<u32>,
     sets: Vec<NestedCells>,
-    /// Places in an order that has neighbours together.
+    /// Origins in an order that has neighbours together.
     order: Vec<u32>,
     samples: Vec<Sample>,
+    /// Variance of a sample by octave, once there are samples.
+    noise: Vec<f64>,
 }
 
-/// What is missed at `places`, by paths whose number grows until the root mean square over area of
+/// What is missed at `origins`, by paths whose number grows until the root mean square over area of
 /// standard errors is at most `error`, or there are as many as can be. By an estimate beforehand
 /// the root mean square of what is missed is `expected` and surely less than a `bound`, which hold
 /// as far as paths do not contradict. The edge of the finest cells is `finest` to twice that, over
-/// the diagonal of the scene. `sample` gives what path number `path` finds missing at a place,
+/// the diagonal of the scene. `sample` gives what path number `path` finds missing at an origin,
 /// W/m², without bias. None where `progress`, as in [`super::correct_by_paths`], stops the work.
 pub(crate) fn missed_light(
-    places: &[Place],
+    origins: &[PathOrigin],
     finest: f64,
     [expected, bound, error]: [f64; 3],
     sample: impl Fn(usize, usize) -> Rgb + Sync,
     mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Option<MissedLight> {
-    if places.is_empty() {
+    if origins.is_empty() {
         return Some(MissedLight { missed: vec![], variance: vec![], error: 0.0 });
     }
-    let mut paths = Paths::new(places, finest);
+    let mut paths = Paths::new(origins, finest);
     let mut count = PATHS[0];
     loop {
         let report = |done: usize| progress(done, count);
@@ -118,7 +122,7 @@ pub(crate) fn missed_light(
     }
 }
 
-impl Place {
+impl PathOrigin {
     /// In the space of cells.
     fn point(&self) -> [f32; 7] {
         let [x, y, z] = self.position.to_array();
@@ -128,8 +132,8 @@ impl Place {
 }
 
 impl Paths<'_> {
-    fn new(places: &[Place], finest: f64) -> Paths<'_> {
-        let points: Vec<[f32; 7]> = places.iter().map(Place::point).collect();
+    fn new(origins: &[PathOrigin], finest: f64) -> Paths<'_> {
+        let points: Vec<[f32; 7]> = origins.iter().map(PathOrigin::point).collect();
         // 2⁻²⁰ is what 32-bit floats resolve of the diagonal.
         let depth = (-finest.log2()).floor().clamp(1.0, 20.0) as i32;
         let set = |k: usize| {
@@ -137,19 +141,28 @@ impl Paths<'_> {
             NestedCells::new(&points, depth, std::array::from_fn(|_| rng.f32()))
         };
         let sets: Vec<NestedCells> = (0..SETS).into_par_iter().map(set).collect();
-        let areas = places.iter().map(|place| place.area).collect();
-        Paths { places, areas, order: sets[0].order(), sets, samples: vec![] }
+        let areas = origins.iter().map(|origin| origin.area).collect();
+        let octaves: Vec<f64> = origins.iter().map(|origin| origin.scale.log2()).collect();
+        let darkest = octaves.iter().copied().fold(f64::INFINITY, f64::min);
+        let octaves: Vec<u32> = octaves.iter().map(|octave| (octave - darkest) as u32).collect();
+        let noise = vec![1.0; 1 + octaves.iter().max().map_or(0, |&octave| octave as usize)];
+        let order = sets[0].order();
+        Paths { origins, areas, octaves, order, sets, samples: vec![], noise }
     }
 
-    /// Traces until there are `count` paths, in proportion to area. `progress` gets the number of
-    /// all.
+    /// Traces until there are `count` paths, in proportion to area and scatter, which makes the
+    /// mean square of errors over the area least (Neyman 1934). `progress` gets the number of all.
     fn trace(
         &mut self,
         count: usize,
         sample: &(impl Fn(usize, usize) -> Rgb + Sync),
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let along = AreaSampler::new(self.order.iter().map(|&item| self.areas[item as usize]));
+        let weight = |&item: &u32| {
+            let (item, octaves) = (item as usize, &self.octaves);
+            self.areas[item] * self.noise[octaves[item] as usize].sqrt()
+        };
+        let along = AreaSampler::new(self.order.iter().map(weight));
         let (first, round) = (self.samples.len(), radical_inverse(self.samples.len() as u32 + 1));
         let numbers: Vec<usize> = (first..count).collect();
         let (mut remaining, mut batches) = (&numbers[..], BatchSizer::new(1024));
@@ -158,7 +171,7 @@ impl Paths<'_> {
                 let trace = |&path: &usize| {
                     let share = ((path - first) as f64 + round) / (count - first) as f64;
                     let item = self.order[along.locate(share).0];
-                    let scale = self.places[item as usize].scale;
+                    let scale = self.origins[item as usize].scale;
                     let value = sample(item as usize, path) / scale;
                     Sample { item, value: value.to_array().map(|x| x as f32) }
                 };
@@ -171,14 +184,15 @@ impl Paths<'_> {
     }
 
     /// What is missed, where so much was `expected`, and at most the second of both.
-    fn missed(&self, expected: [f64; 2]) -> MissedLight {
+    fn missed(&mut self, expected: [f64; 2]) -> MissedLight {
         let most = self.samples.len() / PATHS_OF_CELL;
         let (first, last) = (&self.sets[0], self.sets[0].levels() - 1);
         let left_out = (0..last).find(|&l| first.count(l) <= most).unwrap_or(last);
         let sets: Vec<NestedCells> =
             self.sets.par_iter().map(|set| set.coarsened(left_out)).collect();
-        let of_set = |set| CellSamples::new(set, &self.samples, &self.areas);
+        let of_set = |set| CellSamples::new(set, &self.samples, &self.areas, &self.octaves);
         let samples: Vec<CellSamples> = sets.par_iter().map(of_set).collect();
+        self.noise = samples[0].noise.clone();
         let (spreads, uncertainty) = spreads(&samples, sets[0].levels(), expected);
         let estimates: Vec<Vec<Estimate>> =
             samples.par_iter().map(|samples| samples.estimates(&spreads)).collect();
@@ -193,7 +207,7 @@ impl Paths<'_> {
             (share * sum.0, share * sum.1 + spreads[0] + uncertainty)
         };
         let (missed, variance): (Vec<Rgb>, Vec<f64>) =
-            (0..self.places.len()).into_par_iter().map(at).unzip();
+            (0..self.origins.len()).into_par_iter().map(at).unzip();
         let all: f64 = self.areas.iter().sum();
         let square: f64 = variance.iter().zip(&self.areas).map(|(v, area)| v * area).sum();
         let error = (square / all.max(f64::MIN_POSITIVE)).sqrt();

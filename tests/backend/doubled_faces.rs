@@ -42,7 +42,7 @@ fn check_gather(mut gather: impl Gather, light: &GivenRadiosity) {
 }
 
 fn even_light() -> GivenRadiosity {
-    GivenRadiosity::new(Mesh::new(room(0.0, grey()), 0.1).unwrap(), |_, _| Rgb::ONE)
+    GivenRadiosity::new(Mesh::new(room(0.0, grey()), 0.2).unwrap(), |_, _| Rgb::ONE)
 }
 
 #[test]

@@ -103,7 +103,7 @@ fn a_lamp_alone_has_no_error() {
 
 /// Light shot on two elements a wall is off, and what the vertices gather from it too.
 #[test]
-fn light_shot_too_coarsely_is_told() {
+fn light_shot_too_coarsely_is_estimated_so() {
     let coarse = |settings: &mut BakeSettings| {
         settings.solve.element_size = 1e3;
         settings.solve.near_reach = -1.0;
@@ -113,7 +113,9 @@ fn light_shot_too_coarsely_is_told() {
     };
     let target = BakeTarget::Error(0.05);
     let baked = target.bake_with(cornell(), &Backend::Cpu, coarse, keep_going).unwrap();
-    let settings = verify::Settings::default();
+    // To a quarter of the error, which is enough beside a factor of two.
+    let mut settings = verify::Settings::default();
+    settings.precision = 0.25;
     let proceed = |_: &verify::Progress| ControlFlow::Continue(());
     let measured = verify::verify(&cornell(), &baked.light.surface, &settings, proceed).unwrap();
     let (told, measured) = (baked.estimate, measured.error.unwrap().value);

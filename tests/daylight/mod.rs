@@ -160,8 +160,8 @@ fn hours_are_as_if_computed_one_by_one() {
         let mut gatherer = Backend::Cpu.gather_to_noise(&baked, 0.005).unwrap();
         let mut truth =
             irradiance_at(&baked, &points, &mut *gatherer, keep_counting).unwrap().unwrap();
-        correct_by_paths(&baked, &points, &mut truth, 0.02, keep_counting).unwrap().unwrap();
-        let found = measured(&scene, &points, &[hour], 0.02);
+        correct_by_paths(&baked, &points, &mut truth, 0.03, keep_counting).unwrap().unwrap();
+        let found = measured(&scene, &points, &[hour], 0.03);
         for (found, truth) in found.iter().zip(&truth) {
             let Estimate { value, error } = found.exposure;
             let (true_value, true_error) = (truth.irradiance.x, truth.standard_error.x);

@@ -101,7 +101,7 @@ fn areas_are_those_of_the_cells() {
 #[test]
 fn furnaces_have_their_closed_form_whatever_the_holes() {
     for (rho, tau) in [(0.5, 0.0), (0.9, 0.0), (0.5, 0.4)] {
-        let mesh = cut(furnace(rho, tau), 0.3);
+        let mesh = cut(furnace(rho, tau), 0.45);
         for method in Method::ALL {
             let s = solve(&mesh, method);
             let mut solid = 0;
