@@ -17,8 +17,10 @@ use glam::{DMat3, DVec3};
 use super::GatherPoint;
 use super::light_samples::{LightSample, LightSamples, SampledLeaf};
 use super::light_tree::cone::Cone;
+use super::light_tree::profile::Profile;
 use super::light_tree::{Cut, Leaf, LightTree};
 use crate::geometry::COINCIDENCE_TOLERANCE;
+use crate::geometry::aabb::Aabb;
 use crate::geometry::quadrature::{GAUSS_LEGENDRE_2, GAUSS_LEGENDRE_3, Node};
 use crate::sampling::low_discrepancy::{r2_point, sobol_02_point};
 use crate::sampling::rotation::{CellRotation, second_rotation};
@@ -79,8 +81,8 @@ impl LightTree<Luminaire> {
 }
 
 impl Leaf for Luminaire {
-    fn sphere(&self) -> (DVec3, f64) {
-        (self.position, 0.5 * self.extent())
+    fn bounds(&self) -> Aabb {
+        self.bounds()
     }
 
     fn middle(&self) -> (DVec3, DMat3) {
@@ -106,6 +108,11 @@ impl Leaf for Luminaire {
 
     fn peak(&self) -> f64 {
         self.scale.element_sum() * self.intensity.peak()
+    }
+
+    fn profile(&self) -> Option<Profile> {
+        let peak = |angles| self.scale.element_sum() * self.intensity.peak_between(angles);
+        Some(Profile::new(self.pole(), peak))
     }
 
     fn irradiance(&self, point: &GatherPoint) -> Rgb {

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use super::files::read_text;
 use super::text::{Line, finite, physical_lines};
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, shortened};
 
 /// Weather of a year at a place.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,7 +160,7 @@ impl<'a> Row<'a> {
     ) -> Result<f64, Error> {
         let found = self.cells.get(k).copied().unwrap_or("");
         finite(found).filter(|x| range.contains(x)).ok_or_else(|| {
-            let found = format!("field {}, {name}: {found:?}", k + 1);
+            let found = format!("field {}, {name}: {:?}", k + 1, shortened(found));
             let (low, high) = (range.start(), range.end());
             self.line.parse_error(found, format!("give {unit} from {low} to {high}"))
         })

@@ -175,6 +175,27 @@ impl IntensityDistribution {
         self.values.iter().copied().fold(0.0, f64::max)
     }
 
+    /// The largest intensity between two polar angles, radians, W/sr.
+    pub(crate) fn peak_between(&self, [low, high]: [f64; 2]) -> f64 {
+        let mut peak = 0.0;
+        for values in self.values.chunks_exact(self.polar.len()) {
+            for edge in [low, high] {
+                if let Some((row, down)) = cell(&self.polar, edge) {
+                    peak = f64::max(peak, values[row] + down * (values[row + 1] - values[row]));
+                }
+            }
+            let within = |&(angle, _): &(&f64, &f64)| (low..=high).contains(angle);
+            let inner = self.polar.iter().zip(values).filter(within).map(|(_, value)| *value);
+            peak = inner.fold(peak, f64::max);
+        }
+        peak
+    }
+
+    /// The axis that the polar angles are measured from.
+    pub(crate) fn pole(&self) -> Pole {
+        self.pole
+    }
+
     /// Whether azimuths cover a full turn.
     fn is_closed(&self) -> bool {
         let span = self.azimuths[self.azimuths.len() - 1] - self.azimuths[0];

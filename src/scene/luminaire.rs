@@ -18,8 +18,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::derived::Derived;
-use super::{IntensityDistribution, Rgb, Scene, WarningKind};
+use super::{IntensityDistribution, Pole, Rgb, Scene, WarningKind};
 use crate::error::{Error, ErrorKind};
+use crate::geometry::aabb::Aabb;
 
 /// A lamp with a measured distribution of light.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,6 +109,23 @@ impl Luminaire {
     /// The diagonal of the opening, scene unit.
     pub(crate) fn extent(&self) -> f64 {
         self.opening.size.length()
+    }
+
+    /// The box around the opening along the scene's axes.
+    pub(crate) fn bounds(&self) -> Aabb {
+        let [x, y, z] = [self.c0, self.c90(), self.aim].map(DVec3::abs);
+        let half =
+            0.5 * (self.opening.size.x * x + self.opening.size.y * y + self.opening.size.z * z);
+        Aabb { low: self.position - half, high: self.position + half }
+    }
+
+    /// The axis that polar angles of the intensity turn from, unit length.
+    pub(crate) fn pole(&self) -> DVec3 {
+        match self.intensity.pole() {
+            Pole::Aim => self.aim,
+            Pole::C0 => self.c0,
+            Pole::C90 => self.c90(),
+        }
     }
 
     /// Area of the opening as it is seen along unit `direction`, scene unit squared.

@@ -58,7 +58,7 @@ impl Cone {
 }
 
 /// Angle between unit vectors, radians.
-fn angle(a: DVec3, b: DVec3) -> f64 {
+pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
     a.dot(b).clamp(-1.0, 1.0).acos()
 }
 

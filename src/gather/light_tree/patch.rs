@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 use rustc_hash::FxHashMap;
 
 use super::cone::Cone;
+use super::profile::Profile;
 use super::{Leaf, LightTree, outer};
 use crate::form_factor::closed_form::point_to_polygon;
 use crate::gather::GatherPoint;
@@ -141,9 +142,8 @@ impl Patch {
 }
 
 impl Leaf for Patch {
-    fn sphere(&self) -> (DVec3, f64) {
-        let bounds = Aabb::from_points(self.triangles.iter().flat_map(|t| t.corners));
-        (bounds.centre(), 0.5 * bounds.diagonal())
+    fn bounds(&self) -> Aabb {
+        Aabb::from_points(self.triangles.iter().flat_map(|t| t.corners))
     }
 
     fn middle(&self) -> (DVec3, DMat3) {
@@ -183,6 +183,10 @@ impl Leaf for Patch {
 
     fn peak(&self) -> f64 {
         self.exitance.element_sum() / PI * self.surface.total_area()
+    }
+
+    fn profile(&self) -> Option<Profile> {
+        None
     }
 
     fn irradiance(&self, point: &GatherPoint) -> Rgb {
