@@ -71,7 +71,8 @@ fn a_point_lights_a_plane_by_its_closed_form() {
     let lamp = hung(symmetric(22.5, intensity), 2.0);
     let one = by_rays(&lit(vec![lamp.clone()], &[]), &[above(1.0, 0.0)])[0].irradiance;
     let two = by_rays(&lit(vec![lamp.clone(); 2], &[]), &[above(1.0, 0.0)])[0].irradiance;
-    assert_eq!(two, 2.0 * one);
+    // They are one node of the tree, whose rays choose between them: a few roundings.
+    assert!((two / (2.0 * one) - 1.0).abs().max_element() < 1e-15, "{two} {one}");
     let in_mm = Luminaire { position: 1e3 * lamp.position, ..lamp.in_unit_of(1e-3) };
     let found = by_rays(&lit(vec![in_mm], &[]), &[above(1e3, 0.0)])[0].irradiance;
     assert!((found / one - 1.0).abs().max_element() < 1e-14, "{found} {one}");
