@@ -68,7 +68,7 @@ fn off(scene: Scene, truth: impl Fn(DVec3) -> Rgb) -> [f64; 2] {
 /// Checks `off` where nothing is hidden and where half of the lights are.
 fn check(open: [f64; 2], walled: [f64; 2]) {
     println!("open {open:?}, walled {walled:?}");
-    // Bounds of single nodes are 0.3 % of all. Those of surfaces are far below them, since their
+    // Bounds of single nodes are 0.1 % of all. Those of surfaces are far below them, since their
     // series goes to the second order; of luminaires dozens of errors of a tenth have one sign.
     assert!(open[0] < 0.006, "{open:?}");
     // And 256 rays of which half arrive: 3 %. The mean of 200 such errors is 4 × 3 %/√200 at most.
