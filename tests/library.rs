@@ -16,6 +16,7 @@ mod camera;
 mod common;
 mod daylight;
 mod form_factor;
+mod fuzz_corpus;
 mod gather;
 mod glare;
 mod grid;

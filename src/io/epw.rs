@@ -189,15 +189,16 @@ impl<'a> Row<'a> {
         let day = self.whole(2, "day", 1.0..=DAYS[month as usize - 1], "a day")?;
         let hour = self.whole(3, "hour", 1.0..=24.0, "the hour that ends then,")?;
         let minute = self.whole(4, "minute", 0.0..=60.0, "minutes")?;
-        // Files of hours have 0 or 60, and some have 30; others the minute at which a record ends.
-        let end = if an_hour == 1.0 || minute == 0.0 { 60.0 } else { minute };
+        // The minute at which the record ends; files of hours have 0 or 60, and some have 30. Any
+        // minute within the time of a record stands for that.
+        let number = if minute == 0.0 { an_hour } else { (minute * an_hour / 60.0).ceil() };
         let irradiance = |k, name| self.number(k, name, 0.0..=1e6, "W/m², or 9999 if missing,");
         let dew_point = self.cells.get(7).and_then(|cell| finite(cell));
         Ok(WeatherRecord {
             year: year as i32,
             month: month as u32,
             day: day as u32,
-            middle: hour - 1.0 + end / 60.0 - 0.5 / an_hour,
+            middle: hour - 1.0 + (number - 0.5) / an_hour,
             duration: 1.0 / an_hour,
             direct_normal: irradiance(14, "direct normal irradiance")?,
             diffuse_horizontal: irradiance(15, "diffuse horizontal irradiance")?,
