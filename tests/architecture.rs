@@ -153,3 +153,24 @@ fn files_are_opened_by_io_and_checkpoints_only() {
         assert!(may || !code.contains("std::fs"), "src/{file} opens files");
     }
 }
+
+/// Without `mod`, cargo leaves a file of tests out and says nothing.
+#[test]
+fn every_file_of_tests_is_a_module() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let mut files = vec![];
+    sources(&folder, &mut files);
+    let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
+    let roots: String = ["library.rs", "slow.rs"].map(|root| read(&folder.join(root))).concat();
+    for file in files.iter().filter(|file| file.parent() != Some(&folder)) {
+        let parent = file.parent().unwrap();
+        let (name, above) = match file.file_stem().unwrap().to_str().unwrap() {
+            "main" => continue,
+            "mod" => (parent.file_name().unwrap(), parent.parent().unwrap()),
+            _ => (file.file_stem().unwrap(), parent),
+        };
+        let own = ["mod.rs", "main.rs"].map(|file| read(&above.join(file))).concat();
+        let line = format!("mod {};", name.to_str().unwrap());
+        assert!(format!("{own}{roots}").contains(&line), "no `{line}` for {}", file.display());
+    }
+}
