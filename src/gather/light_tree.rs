@@ -309,9 +309,10 @@ impl Node {
 
     /// Error of intensity times cosine, W/sr, of a node that is `size` times its distance in
     /// radius, whether or not all of its normals are `facing` the point, with the peak of its
-    /// profile towards it, W/sr, if it has one. In the Taylor series of cos θ cos θ′ / d² about the middle, terms of the first order in `size` come from normals
-    /// that differ along the node, by the sine of their half-angle at most. Of nodes of closed,
-    /// open, stretched and hollow shapes, at distances of 1.5 to 60 radii, 99 % are off by less.
+    /// profile towards it, W/sr, if it has one. In the Taylor series of cos θ cos θ′ / d² about the
+    /// middle, terms of the first order in `size` come from normals that differ along the node, by
+    /// the sine of their half-angle at most. Of nodes of closed, open, stretched and hollow shapes,
+    /// at distances of 1.5 to 60 radii, 99 % are off by less.
     fn error(&self, size: f64, is_facing: bool, of_profile: Option<f64>) -> f64 {
         let [spread, strength, of_table] = match (&self.far_field, &self.cone) {
             (_, Some(cone)) if is_facing => [cone.sine(), self.peak, 0.0],

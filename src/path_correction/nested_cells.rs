@@ -228,7 +228,7 @@ impl<'a> CellSamples<'a> {
         let noise = noise(nested, samples, classes);
         let of_sample = |sample: &Sample| noise[classes[sample.item as usize] as usize];
         let sums = nested.sums(samples, areas, of_sample);
-        let variances: Vec<f64> = sums.iter().map(|cells| variance_within(cells)).collect();
+        let variances: Vec<f64> = sums.iter().map(variance_within).collect();
         let excess = variances.iter().map(|variance| (variance - variances[0]).max(0.0)).collect();
         CellSamples { nested, sums, noise, excess }
     }
