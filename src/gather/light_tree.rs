@@ -230,7 +230,7 @@ impl<L: Leaf> LightTree<L> {
         // The half-angle of the node as seen from the point.
         let (distance, radius) = (to.length(), half.length());
         let view = if radius < distance { (radius / distance).asin() } else { PI };
-        let of_profile = node.profile.as_ref().map(|profile| profile.peak(-to / distance, view));
+        let from_centre = -to / distance;
         let to = node.middle - point.position;
         let distance = to.length();
         let towards = -to / distance;
@@ -238,6 +238,7 @@ impl<L: Leaf> LightTree<L> {
         if facing[0] >= FRAC_PI_2 {
             return None;
         }
+        let of_profile = node.profile.as_ref().map(|profile| profile.peak(from_centre, view));
         let lambert = node.facing.filter(|_| facing[1] <= FRAC_PI_2);
         let intensity = match (&lambert, &node.far_field) {
             (Some(facing), _) => *facing * towards,
