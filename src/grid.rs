@@ -48,8 +48,8 @@ pub struct MeasuredGrid {
     pub grid: MeasuringGrid,
     /// Irradiance, in the order of [`MeasuringGrid::points`]; `None` where there is no point.
     pub values: Vec<Option<PointIrradiance>>,
-    /// The part of standard errors that all values have in common, W/m² per channel.
-    pub common_error: Rgb,
+    /// Standard error of the mean of the values outside of solids, W/m² per channel.
+    pub mean_error: Rgb,
 }
 
 impl MeasuringGrid {
@@ -138,8 +138,14 @@ impl MeasuringGrid {
             return Ok(None);
         };
         let mut found = found.into_iter();
-        let values = self.points.iter().map(|p| p.and_then(|_| found.next())).collect();
-        Ok(Some(MeasuredGrid { grid: self.clone(), values, common_error: Rgb::ZERO }))
+        let values: Vec<Option<PointIrradiance>> =
+            self.points.iter().map(|p| p.and_then(|_| found.next())).collect();
+        let open = values.iter().flatten().filter(|value| !value.is_buried());
+        let (count, squares) = open.fold((0.0, Rgb::ZERO), |(count, sum), value| {
+            (count + 1.0, sum + value.standard_error * value.standard_error)
+        });
+        let mean_error = squares.map(f64::sqrt) / f64::max(count, 1.0);
+        Ok(Some(MeasuredGrid { grid: self.clone(), values, mean_error }))
     }
 
     /// The points as they gather.
@@ -172,7 +178,7 @@ impl MeasuredGrid {
         let correction = correct_by_paths(light, &points, &mut values, error, progress)?;
         if let Some(correction) = &correction {
             self.values.iter_mut().flatten().zip(values).for_each(|(old, new)| *old = new);
-            self.common_error = correction.common_error;
+            self.mean_error = correction.mean_error;
         }
         Ok(correction)
     }
@@ -199,6 +205,7 @@ impl MeasuredGrid {
 
     /// Statistics of `quantity`; `None` if no point is outside of solids.
     pub fn statistics(&self, quantity: Quantity) -> Option<GridStatistics> {
-        GridStatistics::of(self.measured(quantity).flatten(), quantity.of(self.common_error))
+        let values = self.measured(quantity).flatten().map(|[value, _]| value);
+        GridStatistics::of(values, quantity.of(self.mean_error))
     }
 }

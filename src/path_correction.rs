@@ -12,83 +12,51 @@
 //! Paths from the points are the adjoint of the light that arrives there: they go where it comes
 //! from, and nowhere else (importance: Smits, Arvo and Salesin 1992).
 //!
-//! With few paths the missed light D(x) of one point has more noise than the light has errors. But
-//! errors of neighbours are alike, so each point takes from the others what it lacks itself. Its
-//! missed light is estimated as normally distributed over the points, with mean μ and variance τ²,
-//! which are estimated too (empirical Bayes: Efron and Morris 1973):
-//!
-//! ```text
-//!   missed = μ + w (D − μ),   w = τ²/(τ² + s²),    variance = w s² + (1 − w)² var(μ)
-//! ```
-//!
-//! for each channel, s² being the variance of D by the scatter of its paths. Where the light is
-//! good, τ is small and few paths do; where it is not, w goes to 1 and the value to that of the
-//! paths alone. Points whose error is too large get twice as many paths until it is not.
+//! With few paths the missed light of one point has more noise than the light has errors. But
+//! errors of neighbours are alike, so each point takes from those around it what its own paths
+//! leave open, over [cells within cells](nested_cells), whose spread the paths estimate too. Where
+//! the light is good, cells do not differ and few paths do; where it is not, the value goes to that
+//! of the paths of the point alone. Points whose error is too large get twice as many paths until
+//! it is not.
 
-#[cfg(feature = "light-map")]
+mod missed_light;
 mod nested_cells;
-mod shrinkage;
-#[cfg(feature = "light-map")]
-mod surface;
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
+use crate::accuracy::Measure;
 use crate::error::{Error, ErrorKind};
 use crate::gather::near_surface::is_near;
+#[cfg(feature = "light-map")]
+use crate::gather::two_sided::TwoSidedPoint;
 use crate::gather::{GatherPoint, GatheredMesh, PointIrradiance, RadiosityField};
 use crate::light::PathTracer;
-use crate::progress::BatchSizer;
 use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
-use shrinkage::{Missed, Shrinkage};
-#[cfg(feature = "light-map")]
-pub(crate) use surface::{PathOrigin, missed_light};
+pub(crate) use missed_light::{Goal, PathOrigin, missed_light, scales};
 
-/// Paths of all points in the first round: bring what they miss in common to 1 % of itself where
-/// paths scatter by 2.5 times their mean.
-const FIRST_PATHS: usize = 1 << 16;
-
-/// Minimum and maximum of those of a point. Fewer leave the scatter of its paths unknown.
-const FIRST_PATHS_OF_POINT: [usize; 2] = [16, 256];
-
-/// Maximum number of paths of a point: brings a scatter of ten times the mean to 1 % of it.
-const MAX_PATHS: usize = 1 << 20;
-
-/// Values darker than this share of their mean are as exact as if they were that bright.
-const FLOOR: f64 = 0.05;
+/// Edge of the finest cells, at least, over that of the box around all points: of a grid of a
+/// million probes 1 000 a side are parted. Plain choice.
+const FINEST_CELL: f64 = 1.0 / 1024.0;
 
 /// What is known of values that paths have corrected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PathCorrection {
-    /// Standard error that all values have in common, W/m² per channel: it is in the errors of
-    /// values, and in that of their mean as a whole. Of harmonics that of the constant one.
-    pub common_error: Rgb,
+    /// Standard error of the mean of the values, W/m² per channel: what neighbours take from the
+    /// same paths they have in common. Of harmonics that of the constant one.
+    pub mean_error: Rgb,
     /// Root mean square of the correction over that of values, lengths over the channels.
     pub correction: f64,
     /// Paths in all.
     pub paths: usize,
     /// Whether every value has the error that was asked for.
     pub is_reached: bool,
-}
-
-/// A value of `N` numbers a channel, such as irradiance or its harmonics.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct NoisyValue<const N: usize> {
-    pub value: [Rgb; N],
-    pub variance: [Rgb; N],
-}
-
-impl<const N: usize> NoisyValue<N> {
-    /// The length of the value, over the channels and the numbers.
-    fn size(&self) -> f64 {
-        self.value.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
-    }
 }
 
 /// Corrects the irradiance `values` that `light` causes at `points`
@@ -111,131 +79,126 @@ pub fn correct_by_paths(
 ) -> Result<Option<PathCorrection>, Error> {
     let missing = MissingLight::new(light);
     let open: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_buried()).collect();
-    let noisy = |&k: &usize| NoisyValue {
-        value: [values[k].irradiance],
-        variance: [values[k].standard_error.map(|x| x * x)],
+    let gathered: Vec<PointIrradiance> = open.iter().map(|&k| values[k]).collect();
+    let points: Vec<&GatherPoint> = open.iter().map(|&k| &points[k]).collect();
+    let noise = moderate(&gathered);
+    let value = |(k, point): (usize, &&GatherPoint)| NoisyValue {
+        position: point.position,
+        normal: point.normal,
+        size: gathered[k].irradiance.length(),
+        variance: noise[k].element_sum(),
     };
-    let mut corrected: Vec<NoisyValue<1>> = open.iter().map(noisy).collect();
-    let sample = |j: usize, path: usize| [missing.irradiance(&points[open[j]], path)];
-    let correction = correct(&mut corrected, error, sample, progress)?;
-    for (k, corrected) in open.into_iter().zip(corrected) {
+    let noisy: Vec<NoisyValue> = points.iter().enumerate().map(value).collect();
+    let sample = |k: usize, path: usize| missing.irradiance(points[k], path).to_array();
+    let Some((missed, mut correction)) = correct(&noisy, error, sample, progress)? else {
+        return Ok(None);
+    };
+    for (k, &point) in open.iter().enumerate() {
+        let [missed, variance] = [missed[k].value, missed[k].variance].map(Rgb::from_array);
         // Irradiance is not negative, and its correction is noisy.
-        values[k].irradiance = corrected.value[0].max(Rgb::ZERO);
-        values[k].standard_error = corrected.variance[0].map(f64::sqrt);
+        values[point].irradiance = (gathered[k].irradiance + missed).max(Rgb::ZERO);
+        values[point].standard_error = (noise[k] + variance).map(f64::sqrt);
     }
-    Ok(correction)
+    let of_gathers = noise.iter().sum::<Rgb>() / (open.len() as f64).max(1.0).powi(2);
+    correction.mean_error = (correction.mean_error.powf(2.0) + of_gathers).map(f64::sqrt);
+    Ok(Some(correction))
 }
 
-/// Corrects `values` by what each misses: `sample` gives that of a value by the number of a path,
-/// without bias. See [`correct_by_paths`] for `error` and `progress`.
+/// A value that paths correct: a number or more for each channel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoisyValue {
+    pub position: DVec3,
+    /// Zero where light arrives from all sides.
+    pub normal: DVec3,
+    /// The length of the value, over the channels and the numbers, W/m².
+    pub size: f64,
+    /// Its variance without what is missed, a sum over the channels and the numbers.
+    pub variance: f64,
+}
+
+/// What a value of `M` numbers misses, W/m², and its variance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MissedValue<const M: usize> {
+    pub value: [f64; M],
+    pub variance: [f64; M],
+}
+
+/// What each of `values` misses: `sample` gives that of a value by the number of a path, without
+/// bias. See [`correct_by_paths`] for `error` and `progress`.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`] for an `error` that is not above 0.
-pub(crate) fn correct<const N: usize>(
-    values: &mut [NoisyValue<N>],
+pub(crate) fn correct<const M: usize>(
+    values: &[NoisyValue],
     error: f64,
-    sample: impl Fn(usize, usize) -> [Rgb; N] + Sync,
-    mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
-) -> Result<Option<PathCorrection>, Error> {
+    sample: impl Fn(usize, usize) -> [f64; M] + Sync,
+    progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Option<(Vec<MissedValue<M>>, PathCorrection)>, Error> {
     if error.is_nan() || error <= 0.0 {
         let remedy = "give a share above 0, such as 0.05";
         return Err(Error::new(ErrorKind::Setting, "error of values", error.to_string(), remedy));
     }
-    moderate(values);
-    let mean = values.iter().map(NoisyValue::size).sum::<f64>() / (values.len() as f64).max(1.0);
-    let allowed: Vec<f64> =
-        values.iter().map(|v| (0.5 * error * v.size().max(FLOOR * mean)).powi(2)).collect();
-    let mut missed = vec![Missed::default(); values.len()];
-    let mut open: Vec<usize> = (0..values.len()).collect();
-    let [least, most] = FIRST_PATHS_OF_POINT;
-    let first = (FIRST_PATHS / values.len().max(1)).clamp(least, most);
-    let (mut paths, mut done) = (first.next_power_of_two(), 0);
-    let estimate = loop {
-        let all = done + open.iter().map(|&k| paths - missed[k].paths).sum::<usize>();
-        let report = |more: usize| progress(done + more, all);
-        if trace(&open, &mut missed, paths, &sample, report).is_break() {
-            return Ok(None);
-        }
-        done = all;
-        let estimate = Shrinkage::new(&missed);
-        let is_open = |&k: &usize| {
-            let variances = values[k].variance.iter().zip(estimate.variance(&missed[k]));
-            variances.map(|(a, b)| (*a + b).element_sum()).sum::<f64>() > allowed[k]
-        };
-        open = (0..values.len()).filter(is_open).collect();
-        if open.is_empty() || paths == MAX_PATHS {
-            break estimate;
-        }
-        paths *= 2;
+    let scales = scales(values.iter().map(|value| value.size), Measure::default().floor);
+    let origins = origins(values, &scales);
+    let most = values.iter().zip(&scales);
+    let most = most.map(|(v, scale)| (0.5 * error).powi(2) - v.variance / (scale * scale));
+    let goal = Goal::Each(most.collect());
+    // As many cells as points that are evenly spread, along a line too.
+    let finest = (0.5 / (values.len() as f64).max(1.0)).max(FINEST_CELL);
+    let unknown = [f64::INFINITY; 2];
+    let Some(missed) = missed_light(&origins, finest, unknown, &goal, sample, progress) else {
+        return Ok(None);
     };
-    Ok(Some(PathCorrection {
-        common_error: estimate.common_variance()[0].map(f64::sqrt),
-        correction: add(&estimate, &missed, values),
-        paths: done,
-        is_reached: open.is_empty(),
-    }))
+    let mean_error = missed.shares.map(|share| (share * missed.mean_variance).sqrt());
+    let value = |(k, scale): (usize, &f64)| MissedValue {
+        value: missed.missed[k].map(|value| scale * value),
+        variance: missed.shares.map(|share| scale * scale * share * missed.variance[k]),
+    };
+    let corrections: Vec<MissedValue<M>> = scales.iter().enumerate().map(value).collect();
+    let added: f64 = corrections.iter().flat_map(|c| c.value).map(|x| x * x).sum();
+    let all: f64 = values.iter().map(|value| value.size * value.size).sum();
+    let correction = PathCorrection {
+        mean_error: Rgb::from_slice(&mean_error),
+        correction: if all > 0.0 { (added / all).sqrt() } else { 0.0 },
+        paths: missed.paths,
+        is_reached: missed.is_reached,
+    };
+    Ok(Some((corrections, correction)))
 }
 
-/// Adds what is missed, and its variance, to `values`; the root mean square of what is added over
-/// that of the values.
-fn add<const N: usize>(
-    estimate: &Shrinkage<N>,
-    missed: &[Missed<N>],
-    values: &mut [NoisyValue<N>],
-) -> f64 {
-    let (mut added, mut all) = (0.0, 0.0);
-    for (value, missed) in values.iter_mut().zip(missed) {
-        let (correction, variance) = (estimate.missed(missed), estimate.variance(missed));
-        added += correction.iter().map(|c| c.length_squared()).sum::<f64>();
-        all += value.size().powi(2);
-        for j in 0..N {
-            value.value[j] += correction[j];
-            value.variance[j] += variance[j];
-        }
-    }
-    if all > 0.0 { (added / all).sqrt() } else { 0.0 }
+/// Where paths start from: positions over the longest edge of the box around all.
+fn origins(values: &[NoisyValue], scales: &[f64]) -> Vec<PathOrigin> {
+    let positions = values.iter().map(|value| value.position);
+    let low = positions.clone().fold(DVec3::INFINITY, DVec3::min);
+    let high = positions.fold(DVec3::NEG_INFINITY, DVec3::max);
+    let edge = (high - low).max_element().max(f64::MIN_POSITIVE);
+    let origin = |(value, &scale): (&NoisyValue, &f64)| PathOrigin {
+        position: (value.position - low) / edge,
+        normal: value.normal,
+        scale,
+        area: 1.0,
+    };
+    values.iter().zip(scales).map(origin).collect()
 }
 
-/// Traces until the points `open` have `paths`. `progress` gets the number of those done.
-fn trace<const N: usize>(
-    open: &[usize],
-    missed: &mut [Missed<N>],
-    paths: usize,
-    sample: &(impl Fn(usize, usize) -> [Rgb; N] + Sync),
-    mut progress: impl FnMut(usize) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    let (mut remaining, mut batches, mut done) = (open, BatchSizer::new(16), 0);
-    while !remaining.is_empty() {
-        let traced = batches.next(&mut remaining, |batch| {
-            let more = |&k: &usize| (k, missed[k].more(paths, |path| sample(k, path)));
-            batch.par_iter().map(more).collect::<Vec<_>>()
-        });
-        for (k, more) in traced {
-            done += more.paths - missed[k].paths;
-            missed[k] = more;
-        }
-        progress(done)?;
-    }
-    ControlFlow::Continue(())
-}
-
-/// Draws the variances of `values` half-way to their mean, relative to the values: each is that of
-/// few gathers, three degrees of freedom, and counts as much as a prior of three from all of them
-/// (Smyth 2004, equation 7).
-fn moderate<const N: usize>(values: &mut [NoisyValue<N>]) {
-    let square = |v: &NoisyValue<N>| v.size().powi(2).max(f64::MIN_POSITIVE);
-    let relative = |v: &NoisyValue<N>| v.variance.map(|variance| variance / square(v));
-    let mut mean = [Rgb::ZERO; N];
-    for value in values.iter() {
-        let share = relative(value).map(|variance| variance / values.len() as f64);
-        mean.iter_mut().zip(share).for_each(|(mean, share)| *mean += share);
-    }
+/// Variances of `values`, half-way to their mean over values as bright, by octaves, relative to the
+/// values: each is that of few gathers, three degrees of freedom, and counts as much as a prior of
+/// three from the others (Smyth 2004, equation 7).
+fn moderate(values: &[PointIrradiance]) -> Vec<Rgb> {
+    let square = |v: &PointIrradiance| v.irradiance.length_squared().max(f64::MIN_POSITIVE);
+    let octave = |v: &PointIrradiance| (0.5 * square(v).log2()).floor() as i64;
+    let variance = |v: &PointIrradiance| v.standard_error * v.standard_error;
+    let mut octaves = FxHashMap::<i64, (f64, Rgb)>::default();
     for value in values {
-        let all = square(value);
-        for (variance, mean) in value.variance.iter_mut().zip(&mean) {
-            *variance = 0.5 * (*variance + *mean * all);
-        }
+        let (count, sum) = octaves.entry(octave(value)).or_default();
+        *count += 1.0;
+        *sum += variance(value) / square(value);
     }
+    let moderated = |value: &PointIrradiance| {
+        let (count, sum) = octaves[&octave(value)];
+        0.5 * (variance(value) + sum / count * square(value))
+    };
+    values.iter().map(moderated).collect()
 }
 
 /// The light that a field misses.
@@ -253,6 +216,24 @@ impl MissingLight<'_> {
     /// Irradiance that is missed at `point`, by path number `path`, W/m².
     fn irradiance(&self, point: &GatherPoint, path: usize) -> Rgb {
         self.irradiance_past(point, false, path)
+    }
+
+    /// Irradiance that is missed at a point of a surface, by path number `path`, W/m². With
+    /// `near_paths` what near surfaces reflect is not the field's, as in
+    /// [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
+    #[cfg(feature = "light-map")]
+    pub fn irradiance_two_sided(
+        &self,
+        point: &TwoSidedPoint,
+        near_paths: bool,
+        path: usize,
+    ) -> Rgb {
+        let [own, other] = point.shares();
+        let front = own * self.irradiance_past(&point.point, near_paths, path);
+        if other == Rgb::ZERO {
+            return front;
+        }
+        front + other * self.irradiance_past(&point.other_side(), near_paths, path)
     }
 
     /// The same past near surfaces where `near_paths` have their light.

@@ -139,28 +139,38 @@ pub fn correct_probes(
     let (missing, near) = (MissingLight::new(light), near(light, size));
     let open: Vec<usize> = (0..probes.len()).filter(|&k| !probes[k].is_inside()).collect();
     let noisy = |&k: &usize| NoisyValue {
-        value: probes[k].irradiance.coefficients,
-        variance: [Rgb::ZERO; COUNT],
+        position: probes[k].position,
+        normal: DVec3::ZERO,
+        size: numbers(&probes[k].irradiance).iter().map(|x| x * x).sum::<f64>().sqrt(),
+        variance: 0.0,
     };
-    let mut corrected: Vec<NoisyValue<COUNT>> = open.iter().map(noisy).collect();
+    let values: Vec<NoisyValue> = open.iter().map(noisy).collect();
     let sample = |j: usize, path: usize| {
         let position = probes[open[j]].position;
         let mut rng = numbers_of(position, DVec3::ZERO, path);
         let direction = harmonics::uniform_direction([rng.f64(), rng.f64()]);
         let radiosity = missing.radiosity(position, direction, near, &mut rng);
         // Radiance B/π, of a density of 1/4π.
-        Harmonics::irradiance_of_direction(direction, 4.0 * radiosity).coefficients
+        numbers(&Harmonics::irradiance_of_direction(direction, 4.0 * radiosity))
     };
-    let correction = correct(&mut corrected, error, sample, progress)?;
-    if correction.is_some() {
-        for (k, NoisyValue { value, variance }) in open.into_iter().zip(corrected) {
-            probes[k].irradiance.coefficients = value;
-            // The mean over the sphere of |Σ c_i Y_i|².
-            let square = variance.iter().map(|v| v.element_sum()).sum::<f64>() / (4.0 * PI);
-            probes[k].deviation = probes[k].deviation.hypot(square.sqrt());
+    let Some((missed, correction)) = correct(&values, error, sample, progress)? else {
+        return Ok(None);
+    };
+    for (k, missed) in open.into_iter().zip(missed) {
+        let Probe { irradiance, deviation, .. } = &mut probes[k];
+        for (own, value) in irradiance.coefficients.iter_mut().zip(missed.value.chunks(3)) {
+            *own += Rgb::from_slice(value);
         }
+        // The mean over the sphere of |Σ c_i Y_i|².
+        let square = missed.variance.iter().sum::<f64>() / (4.0 * PI);
+        *deviation = deviation.hypot(square.sqrt());
     }
-    Ok(correction)
+    Ok(Some(correction))
+}
+
+/// The coefficients, channel by channel.
+fn numbers(irradiance: &Harmonics) -> [f64; 3 * COUNT] {
+    std::array::from_fn(|k| irradiance.coefficients[k / 3][k % 3])
 }
 
 /// Distance within which a probe of this `size` sees nothing, scene unit.

@@ -27,7 +27,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy error form_factor geometry linear mesh progress sampling scene vertex \
          visibility",
     ),
-    ("path_correction", "error gather light progress sampling scene visibility"),
+    ("path_correction", "accuracy error gather light progress sampling scene visibility"),
     ("grid", "error gather geometry path_correction scene visibility"),
     ("daylight", "error gather light progress sampling scene visibility"),
     ("probe", "error gather path_correction progress scene visibility"),

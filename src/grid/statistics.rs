@@ -19,20 +19,17 @@ pub struct GridStatistics {
 }
 
 impl GridStatistics {
-    /// Of values with their standard errors, of which `common` is a part that all have alike;
-    /// `None` if there are none.
-    pub fn of(values: impl Iterator<Item = [f64; 2]>, common: f64) -> Option<GridStatistics> {
-        let (mut points, mut sum, mut squares) = (0, 0.0, 0.0);
+    /// Of values, whose mean has this standard error; `None` if there are none.
+    pub fn of(values: impl Iterator<Item = f64>, mean_error: f64) -> Option<GridStatistics> {
+        let (mut points, mut sum) = (0, 0.0);
         let (mut minimum, mut maximum) = (f64::INFINITY, f64::NEG_INFINITY);
-        for [value, error] in values {
+        for value in values {
             points += 1;
             sum += value;
-            squares += (error * error - common * common).max(0.0);
             minimum = value.min(minimum);
             maximum = value.max(maximum);
         }
-        let count = f64::from(points);
-        let (mean, mean_error) = (sum / count, (squares.sqrt() / count).hypot(common));
+        let mean = sum / f64::from(points);
         let uniformity = if mean > 0.0 { minimum / mean } else { 0.0 };
         let points = points as usize;
         (points > 0).then_some(GridStatistics {

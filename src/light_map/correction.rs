@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 
 use super::gathered::{LightMap, check_scene};
 use super::texel_points::TexelPoints;
-use crate::accuracy::Measure;
 use crate::bake::BakeResult;
 use crate::error::Error;
-use crate::path_correction::{MissingLight, PathOrigin, missed_light};
+use crate::path_correction::{Goal, MissingLight, PathOrigin, missed_light, scales};
+use crate::scene::Rgb;
 
 /// Edge of the finest cells over which texels share paths, in texels.
 const TEXELS_OF_CELL: f64 = 4.0;
@@ -35,7 +35,8 @@ impl LightMap {
         check_scene(&self.atlas, &baked.light)?;
         let texels: Vec<u32> =
             (0..self.gathered.len() as u32).filter(|&k| self.gathered[k as usize]).collect();
-        let scales = self.scales(&texels, baked.settings.measure);
+        let sizes = texels.iter().map(|&texel| self.irradiance[texel as usize].length());
+        let scales = scales(sizes, baked.settings.measure.floor);
         let points = TexelPoints::new(&self.atlas);
         let scene = self.atlas.scene();
         let (origin, diagonal) = (scene.bounds().low, scene.bounds().diagonal());
@@ -54,30 +55,23 @@ impl LightMap {
         let sample = |k: usize, path: usize| {
             let texel = texels[k];
             let point = points.point(texel, triangle(texel));
-            missing.irradiance_two_sided(&point, self.near_paths[texel as usize], path)
+            let near_paths = self.near_paths[texel as usize];
+            missing.irradiance_two_sided(&point, near_paths, path).to_array()
         };
         let finest = TEXELS_OF_CELL * self.atlas.texel_size() / diagonal;
-        let errors = [baked.estimate.of_light(), baked.estimate.total, error];
-        let Some(found) = missed_light(&origins, finest, errors, sample, progress) else {
+        let (expected, goal) =
+            ([baked.estimate.of_light(), baked.estimate.total], Goal::Mean(error));
+        let Some(found) = missed_light(&origins, finest, expected, &goal, sample, progress) else {
             return Ok(None);
         };
         for (k, &texel) in texels.iter().enumerate() {
             let texel = texel as usize;
-            let corrected = self.irradiance[texel] + scales[k] * found.missed[k];
-            self.irradiance[texel] = corrected.max(crate::Rgb::ZERO);
+            let corrected = self.irradiance[texel] + scales[k] * Rgb::from_array(found.missed[k]);
+            self.irradiance[texel] = corrected.max(Rgb::ZERO);
             let of_light = scales[k] * found.variance[k].sqrt();
             self.standard_error[texel] = self.standard_error[texel].hypot(of_light);
         }
         self.finish();
         Ok(Some(found.error))
-    }
-
-    /// What errors of `texels` are shares of, W/m².
-    fn scales(&self, texels: &[u32], measure: Measure) -> Vec<f64> {
-        let sizes = texels.iter().map(|&texel| self.irradiance[texel as usize].length());
-        let mean = sizes.clone().sum::<f64>() / (texels.len() as f64).max(1.0);
-        // Where nothing arrived, what paths find is taken as it is.
-        let floor = if mean > 0.0 { measure.floor * mean } else { 1.0 };
-        sizes.map(|size| size.max(floor)).collect()
     }
 }
