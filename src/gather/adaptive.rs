@@ -295,14 +295,14 @@ impl<'a> AdaptiveGather<'a> {
             self.scale.radiosity_floor,
             |gathered| progress(&Progress { pass, refinements, elements, gathered, total }),
         );
-        let Some(added) = added else { return StopReason::Cancelled };
+        let Some((added, gathered)) = added else { return StopReason::Cancelled };
         let before = self.samples.reflected.clone();
         for (value, added) in self.samples.reflected.iter_mut().zip(added) {
             *value = (*value + added).max(Rgb::ZERO);
         }
         extrapolate_into_buried(&mut self.samples);
         self.relative_change = self.samples.relative_change(&before);
-        self.gather_count += total as u64;
+        self.gather_count += gathered as u64;
         self.promote_to_source();
         self.has_all_bounces = true;
         StopReason::Converged

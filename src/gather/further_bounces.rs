@@ -26,14 +26,15 @@ impl GatheredFrom<'_> {
     /// The reflected radiosity that all further bounces add at each vertex, W/m², by rows of
     /// `maker`; converged to a thousandth of it, or of `floor` (W/m²) where it is less. Surfaces
     /// nearer than `touching` (scene unit) touch. `progress` is called with the number of vertices
-    /// that have cast their rays; `None` if it breaks.
+    /// that have cast their rays; `None` if it breaks. Black vertices cast none: the second result
+    /// is the number of the others.
     pub fn further_bounces(
         &self,
         maker: &dyn PointRows,
         touching: f64,
         floor: f64,
         progress: impl FnMut(usize) -> ControlFlow<()>,
-    ) -> Option<Vec<Rgb>> {
+    ) -> Option<(Vec<Rgb>, usize)> {
         let SampledMesh { mesh, vertices, .. } = self.samples;
         let maker = SurfaceRows { maker, source: self.source.mesh };
         let rows = VertexRows::new(mesh, vertices, touching, &maker);
@@ -42,10 +43,11 @@ impl GatheredFrom<'_> {
         let equation = |v: u32, row: &VertexRow| self.equation(&rows, v, row);
         let of_gathering = rows.map(&gathering, 1, equation, progress)?;
         let mut equations = vec![Equation::default(); vertices.positions.len()];
+        let count = gathering.len();
         for (v, equation) in gathering.into_iter().zip(of_gathering) {
             equations[v as usize] = equation;
         }
-        Some(converge(&equations, floor))
+        Some((converge(&equations, floor), count))
     }
 
     /// The equation of vertex `v`; darkness where it is buried.
