@@ -14,7 +14,7 @@
 //!
 //! With few paths the missed light of one point has more noise than the light has errors. But
 //! errors of neighbours are alike, so each point takes from those around it what its own paths
-//! leave open, over [cells within cells](nested_cells), whose spread the paths estimate too. Where
+//! leave open, over cells within cells (`nested_cells`), whose spread the paths estimate too. Where
 //! the light is good, cells do not differ and few paths do; where it is not, the value goes to that
 //! of the paths of the point alone. Points whose error is too large get twice as many paths until
 //! it is not.
