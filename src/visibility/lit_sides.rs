@@ -1,7 +1,9 @@
 //! Determines the sides of triangles that light can reach: these sides reflect.
 //!
-//! Each side is tested by a few random walks from points on it. A walk scatters diffusely at every
-//! hit, on either side, and ends at light: at a lamp that it sees or hits, or in the sky.
+//! Each connected surface is tested by a few random walks from points on it, and each of its
+//! triangles by more where walks from both sides of the surface reach light: nearly all surfaces of
+//! most scenes are lit from one side. A walk scatters diffusely at every hit, on either side, and
+//! ends at light: at a lamp that it sees or hits, or in the sky.
 //!
 //! ```text
 //!        lamp                    The walk from the upper side of t scatters in the room and
@@ -27,6 +29,7 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::sampling::hash::split_mix64;
@@ -44,8 +47,9 @@ impl Scene {
     /// order, second ones after all others; lamps that reflect on both sides add a material that
     /// does not emit.
     ///
-    /// Lit sides are determined by random walks from points on each side, the same for the same
-    /// scene: at least four per side, of up to 16 bounces. A triangle that light does not reach
+    /// Lit sides are determined by random walks of up to 16 bounces, the same for the same scene:
+    /// from at least 16 points on each connected surface, and where both of its sides are lit from
+    /// at least four on each side of each triangle. A triangle that light does not reach
     /// keeps its winding, and so do the walls of a closed room around all of the scene; a surface
     /// that reflects nothing has one side. Of triangles with the same corners, material and group,
     /// in either winding, the first is kept; of lamps one for each side, unless light from one
@@ -106,10 +110,19 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> (Vec<Treatment>, Option<Warning
     let sheets = Sheets::new(scene);
     let walks = Walks::new(scene, sides, &sheets);
     let all: Vec<SideIndex> = (0..2 * count).filter(|_| walks.has_light()).collect();
-    let light = sheets.sample(&all, |side, rng| {
+    let to_light = |side, rng: &mut Rng| {
         let start = walks.random_start(side, rng)?;
         walks.walk_to_light(start, side, rng)
-    });
+    };
+    let mut light = sheets.sample(&all, to_light);
+    // Elsewhere the result is that of the sheets: one of the sides is dark.
+    let in_doubt = |t: &usize| {
+        let are_both_lit = [2 * t, 2 * t + 1].iter().all(|&side| light.of_sheet(side).hits > 0.0);
+        are_both_lit || walks.has_light() && is_covered(&walks, *t)
+    };
+    let in_doubt: Vec<usize> = (0..count).into_par_iter().filter(in_doubt).collect();
+    let in_doubt: Vec<SideIndex> = in_doubt.into_iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
+    light.add_points(&in_doubt, to_light);
     let lit = LitSides::new(scene, &light, &all);
     let is_room = closed_rooms(scene);
     let backs = LampBacks::new(scene, &walks, &sheets);
@@ -178,7 +191,8 @@ impl<'a> LitSides<'a> {
             let is_dark = neither && sides.iter().any(is_darker);
             for side in sides.iter().filter(|&side| !is_dark && !is_darker(side)) {
                 is_lit[*side] = light.of_sheet(*side).share() >= LIT_SHARE;
-                if is_lit[*side] && scene.material(side / 2).scatters() {
+                let has_points = light.of(*side).points > 0.0;
+                if is_lit[*side] && has_points && scene.material(side / 2).scatters() {
                     flux += light.of(*side).mean() * scene.solid_area(side / 2);
                     lit_area += scene.solid_area(side / 2);
                 }
@@ -204,6 +218,12 @@ impl<'a> LitSides<'a> {
     fn is_bright(&self, side: SideIndex) -> bool {
         self.light.of_sheet(side).mean() >= self.min_irradiance
     }
+}
+
+/// Whether a front coincides with the back of triangle `t` at some point.
+fn is_covered(walks: &Walks, t: usize) -> bool {
+    let mut rng = Rng::with_seed(split_mix64(t as u64));
+    walks.front_before(walks.random_point(t, &mut rng), 2 * t + 1).is_some()
 }
 
 /// Whether all of the back of triangle `t` coincides with fronts of others that light reaches: rays
