@@ -85,7 +85,7 @@ impl DirectionalLight {
     /// Irradiance that luminaires cause at `point`, W/m² per channel, coarsely where they are many:
     /// the source of further bounces.
     pub fn of_luminaires(&self, point: &GatherPoint) -> Rgb {
-        self.luminaires().irradiance(point, f64::INFINITY).irradiance
+        self.luminaires().coarse_irradiance(point)
     }
 
     fn luminaires(&self) -> LuminaireLight<'_> {

@@ -33,11 +33,6 @@ use cone::Cone;
 use far_field::FarField;
 use profile::Profile;
 
-/// Largest bound of a node's error as a share of the irradiance of all lights. Of a field of 400
-/// lamps all errors add up to 0.04 %, of one of 400 luminaires to 0.4 %; with 3e-3 to 0.1 and 1 %,
-/// 10 % faster (`tests/backend/many_lights.rs`).
-const MAX_BOUND: f64 = 1e-3;
-
 /// Nodes that are opened in any case: so few lights are exact, at a price that nobody notices.
 const OPENED: usize = 16;
 
@@ -179,15 +174,14 @@ impl<L: Leaf> LightTree<L> {
     }
 
     /// Nodes whose irradiance at `point` is off by at most the share `max_bound` of that of all
-    /// each, or by 0.1 %.
+    /// each.
     pub fn cut(&self, point: &GatherPoint, max_bound: f64) -> Cut {
-        let share = max_bound.min(MAX_BOUND);
         let (mut open, mut nodes) = (BinaryHeap::new(), vec![]);
         open.extend(self.estimate(0, point));
         let mut total: f64 = open.iter().map(CutNode::brightness).sum();
         for opened in 0.. {
             let Some(node) = open.pop() else { break };
-            let is_enough = node.bound <= share * total.max(self.floor);
+            let is_enough = node.bound <= max_bound * total.max(self.floor);
             if node.bound == 0.0 || is_enough && opened >= OPENED {
                 open.push(node);
                 break;
