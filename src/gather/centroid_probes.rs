@@ -1,16 +1,22 @@
 //! Centroid probes: gathers by few rays at the centroids of elements.
 //!
-//! If all corners of an element are lit, a narrow shadow in its middle affects no vertex. So before
-//! refinement ends, each centroid gathers once. Where the light differs from the interpolant of the
-//! corners, the element has that error, and is split if it pays.
+//! If all corners of an element are lit, a narrow shadow in its middle affects no vertex, nor does
+//! light that repeats itself from vertex to vertex, as of lamps in rows. So before refinement ends,
+//! each centroid gathers once. As far as the light differs from the interpolant of the corners by
+//! more than noise, the element has that error, and is split if it pays.
 
 use super::gather_points::{SurfaceOffset, is_buried};
 use super::refinement_indicator::ErrorScale;
 use super::sampled_mesh::{SampledMesh, after_split};
+use super::surplus::beyond_noise;
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
+
+/// Standard errors up to which a difference is taken for noise: of normal errors one in 400 is
+/// larger, and rays know theirs roughly.
+const NOISES: f64 = 3.0;
 
 /// Relative errors of elements, root mean square, by their centroids.
 #[derive(Clone)]
@@ -65,12 +71,13 @@ impl CentroidProbes {
             let corners = samples.corners()[e].map(|v| samples.reflected[v as usize]);
             let expected = corners.iter().sum::<Rgb>() / 3.0 + material.exitance;
             let darker = probed.length().min(expected.length()).max(scale.radiosity_floor);
-            let difference = (probed - expected).length() / darker;
+            let of_corners = samples.corners()[e].map(|v| samples.noise[v as usize].powi(2));
+            let own = material.albedo().max_element() * sample.noise;
+            let noise = (own * own + of_corners.iter().sum::<f64>() / 9.0).sqrt();
+            let difference = beyond_noise((probed - expected).length(), NOISES * noise);
             let is_known = !is_buried(sample, scale.touching()) && darker > 0.0;
-            // Up to 0.6 it may be noise: with 0.4 and 16 rays, two of three alarms were false. Of a
-            // bump of unknown shape over the whole element, half is the root mean square.
-            let is_off = is_known && difference > 0.6;
-            self.errors[e] = if is_off { (0.5 * difference) as f32 } else { 0.0 };
+            // Of a bump of unknown shape over the whole element, half is the root mean square.
+            self.errors[e] = if is_known { (0.5 * difference / darker) as f32 } else { 0.0 };
         }
         Ok(())
     }

@@ -37,7 +37,7 @@ use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
 use closed_rooms::closed_rooms;
 use lamp_backs::LampBacks;
 use repeated::repeated_triangles;
-use sheets::{LIT_SHARE, Sheets, SideIndex, SideStatistics};
+use sheets::{LIT_SHARE, Samples, Sheets, SideIndex, SideStatistics};
 use walks::Walks;
 
 impl Scene {
@@ -48,12 +48,13 @@ impl Scene {
     /// does not emit.
     ///
     /// Lit sides are determined by random walks of up to 16 bounces, the same for the same scene:
-    /// from at least 16 points on each connected surface, and where both of its sides are lit from
-    /// at least four on each side of each triangle. A triangle that light does not reach
-    /// keeps its winding, and so do the walls of a closed room around all of the scene; a surface
-    /// that reflects nothing has one side. Of triangles with the same corners, material and group,
-    /// in either winding, the first is kept; of lamps one for each side, unless light from one
-    /// reaches much further. Warnings give the numbers of dropped, flipped and doubled triangles.
+    /// from at least 16 points on each connected surface, and where both of its sides are lit, or
+    /// one barely, from at least four on each side of each triangle. A triangle that light does not
+    /// reach keeps its winding, and so do the walls of a closed room around all of the scene; a
+    /// surface that reflects nothing has one side. Of triangles with the same corners, material and
+    /// group, in either winding, the first is kept; of lamps one for each side, unless light from
+    /// one reaches much further. Warnings give the numbers of dropped, flipped and doubled
+    /// triangles.
     #[must_use]
     pub fn resolve_sides(&self) -> Scene {
         if is_resolved(self) {
@@ -115,10 +116,14 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> (Vec<Treatment>, Option<Warning
         walks.walk_to_light(start, side, rng)
     };
     let mut light = sheets.sample(&all, to_light);
-    // Elsewhere the result is that of the sheets: one of the sides is dark.
+    // Elsewhere the result is that of the sheets: one of the sides is dark, and the other surely
+    // reaches the share that counts as lit, or nothing.
     let in_doubt = |t: &usize| {
-        let are_both_lit = [2 * t, 2 * t + 1].iter().all(|&side| light.of_sheet(side).hits > 0.0);
-        are_both_lit || walks.has_light() && is_covered(&walks, *t)
+        let [front, back] = [2 * t, 2 * t + 1].map(|side| light.of_sheet(side));
+        let is_unsure = |s: Samples| s.hits > 0.0 && s.share() < 3.0 * LIT_SHARE;
+        let are_both_lit = front.hits > 0.0 && back.hits > 0.0;
+        let is_covered = || walks.has_light() && is_covered(&walks, *t);
+        are_both_lit || is_unsure(front) || is_unsure(back) || is_covered()
     };
     let in_doubt: Vec<usize> = (0..count).into_par_iter().filter(in_doubt).collect();
     let in_doubt: Vec<SideIndex> = in_doubt.into_iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();

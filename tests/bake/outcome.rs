@@ -8,7 +8,7 @@ use glam::DVec3;
 use radiosity::bake::{BakeProgress, Obstacle, Outcome};
 use radiosity::{Backend, BakeSettings, BakeTarget, Material, Rgb, Scene, Triangle, verify};
 
-use crate::common::scenes::{facing_up, quads};
+use crate::common::scenes::{block, facing_up, quads, walls};
 use crate::common::{cornell_box, keep_going};
 
 fn cornell() -> Scene {
@@ -28,6 +28,24 @@ fn each_group_meets_its_error() {
     assert_eq!(baked.outcome, Outcome::Reached);
     // More points on a small group than its area would give it.
     assert!(baked.groups.iter().all(|group| group.estimate.samples >= 16));
+}
+
+/// 64 lamps below a ceiling of 6 m, in steps of 0.75 m: all vertices of coarse elements are alike,
+/// and the light between them is 1.5 times as bright.
+#[test]
+fn light_in_step_with_the_mesh_is_resolved() {
+    let lamp = Material { exitance: Rgb::splat(30.0), ..Material::grey("lamp", 0.0) };
+    let grey = Material::grey("wall", 0.6);
+    let mut faces: Vec<_> =
+        walls([0.0; 3], [6.0, 6.0, 3.0]).map(|wall| (wall, grey.clone())).into_iter().collect();
+    for k in 0..64 {
+        let [x, y] = [k % 8, k / 8].map(|i| (f64::from(i) + 0.5) * 0.75);
+        let [low, high] = [-0.07, 0.07].map(|by| [x + by, y + by, 2.7 + by]);
+        faces.extend(block(low, high).map(|side| (side, lamp.clone())));
+    }
+    let baked = BakeTarget::Error(0.1).bake(quads(&faces), &Backend::Cpu, keep_going).unwrap();
+    println!("{} {:?}", baked.outcome, baked.estimate);
+    assert_eq!(baked.outcome, Outcome::Reached);
 }
 
 #[test]

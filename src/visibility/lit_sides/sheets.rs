@@ -12,6 +12,10 @@ use crate::scene::{HalfEdge, Scene};
 /// second of two rooms, which has no lamp, it is 25 to 40 %.
 pub const LIT_SHARE: f64 = 0.1;
 
+/// Points per side, whatever its area: a few dozen triangles of a sheet that are lit from the other
+/// side than its large ones are found. Plain choice.
+const SHARE_OF_SIDES: f64 = 0.125;
+
 /// A side of a triangle: twice its index, plus one for its back.
 pub type SideIndex = usize;
 
@@ -41,7 +45,8 @@ impl Sheets {
         let of_sheet = (16384.0 / count as f64).clamp(16.0, 128.0);
         let density = |(side, &first): (SideIndex, &SideIndex)| {
             let share = area(side) / areas[first];
-            2048.0 * area(side) / total_area + if share > 0.0 { of_sheet * share } else { 0.0 }
+            let of_area = 2048.0 * area(side) / total_area;
+            SHARE_OF_SIDES + of_area + if share > 0.0 { of_sheet * share } else { 0.0 }
         };
         let density = first.iter().enumerate().map(density).collect();
         Sheets { first, density }
