@@ -23,33 +23,36 @@ pub type SideIndex = usize;
 pub struct Sheets {
     /// Per side, the first side of its sheet.
     first: Vec<SideIndex>,
-    /// Per side, the expected number of sample points on it, in proportion to area on each sheet.
-    density: Vec<f64>,
+    /// Per triangle, scene unit squared.
+    areas: Vec<f64>,
+    /// Minimum number of sample points on a sheet.
+    of_sheet: f64,
 }
 
 impl Sheets {
     pub fn new(scene: &Scene) -> Sheets {
         let first = first_sides(scene);
-        let area = |side: SideIndex| scene.area(side / 2);
-        let mut areas = vec![0.0; first.len()];
-        let mut is_first = vec![false; first.len()];
-        for (side, &first) in first.iter().enumerate() {
-            areas[first] += area(side);
-            is_first[first] = true;
-        }
-        let count = is_first.iter().filter(|&&is_first| is_first).count();
-        let total_area = areas.iter().sum::<f64>() / 2.0;
+        let count = (0..first.len()).filter(|&side| first[side] == side).count();
         // More where there are few sheets, 16384 in all. Of 16 walks from a side of which a share
         // of `LIT_SHARE` reaches light, at least one does with a probability of 81 %, and of a
         // share of a quarter 99 %. Plain choice.
         let of_sheet = (16384.0 / count as f64).clamp(16.0, 128.0);
-        let density = |(side, &first): (SideIndex, &SideIndex)| {
-            let share = area(side) / areas[first];
-            let of_area = 2048.0 * area(side) / total_area;
-            SHARE_OF_SIDES + of_area + if share > 0.0 { of_sheet * share } else { 0.0 }
+        let areas = (0..scene.triangles().len()).map(|t| scene.area(t)).collect();
+        Sheets { first, areas, of_sheet }
+    }
+
+    /// The expected number of sample points on each of `sides`, of which those of each sheet share
+    /// its points by area.
+    fn densities(&self, sides: &[SideIndex]) -> Vec<f64> {
+        let mut of_sheets = vec![0.0; self.first.len()];
+        sides.iter().for_each(|&side| of_sheets[self.first[side]] += self.areas[side / 2]);
+        let total: f64 = self.areas.iter().sum();
+        let density = |&side: &SideIndex| {
+            let area = self.areas[side / 2];
+            let of_area = 2048.0 * area / total;
+            SHARE_OF_SIDES + of_area + self.of_sheet * area / of_sheets[self.first[side]]
         };
-        let density = first.iter().enumerate().map(density).collect();
-        Sheets { first, density }
+        sides.iter().map(density).collect()
     }
 
     /// The first side of the sheet of a side.
@@ -69,8 +72,7 @@ impl Sheets {
             of_sides: vec![Samples::default(); self.first.len()],
             of_sheets: vec![Samples::default(); self.first.len()],
         };
-        let count = |side: SideIndex, rng: &mut Rng| (self.density[side] + rng.f64()) as usize;
-        statistics.add(sides, 0, count, find);
+        statistics.add(sides, 0, |density, rng| (density + rng.f64()) as usize, find);
         statistics
     }
 }
@@ -92,20 +94,19 @@ impl SideStatistics<'_> {
         sides: &[SideIndex],
         find: impl Fn(SideIndex, &mut Rng) -> Option<f64> + Sync,
     ) {
-        let density = &self.sheets.density;
-        self.add(sides, 1, |side, _| density[side].max(4.0).ceil() as usize, find);
+        self.add(sides, 1, |density, _| density.max(4.0).ceil() as usize, find);
     }
 
     fn add(
         &mut self,
         sides: &[SideIndex],
         stream: u64,
-        count: impl Fn(SideIndex, &mut Rng) -> usize + Sync,
+        count: impl Fn(f64, &mut Rng) -> usize + Sync,
         find: impl Fn(SideIndex, &mut Rng) -> Option<f64> + Sync,
     ) {
-        let from_side = |&side: &SideIndex| {
+        let from_side = |(&side, density): (&SideIndex, f64)| {
             let mut rng = Rng::with_seed(split_mix64(side as u64) ^ stream);
-            let points = count(side, &mut rng);
+            let points = count(density, &mut rng);
             let mut samples = Samples { points: points as f64, ..Samples::default() };
             for value in (0..points).filter_map(|_| find(side, &mut rng)) {
                 samples.hits += 1.0;
@@ -113,7 +114,9 @@ impl SideStatistics<'_> {
             }
             (side, samples)
         };
-        let samples: Vec<(SideIndex, Samples)> = sides.par_iter().map(from_side).collect();
+        let densities = self.sheets.densities(sides);
+        let samples: Vec<(SideIndex, Samples)> =
+            sides.par_iter().zip(densities).map(from_side).collect();
         for (side, samples) in samples {
             self.of_sides[side].add(samples);
             self.of_sheets[self.sheets.first[side]].add(samples);
