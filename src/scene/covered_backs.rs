@@ -31,7 +31,8 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let (corners, positions) = scene.welded_corners();
     let meeting =
         Incidence::new(positions, || corners.iter().map(<[u32; 3]>::as_slice).enumerate());
-    let surfaces = Surfaces { scene, corners, meeting };
+    let normals = (0..count).into_par_iter().map(|t| scene.normal(t)).collect();
+    let surfaces = Surfaces { scene, normals, corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
         (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
     Covers::new((0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))))
@@ -40,6 +41,7 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
 /// Triangles by the positions of their corners.
 struct Surfaces<'a> {
     scene: &'a Scene,
+    normals: Vec<DVec3>,
     /// Per triangle, the positions of its corners by number.
     corners: Vec<[u32; 3]>,
     /// The triangles that meet at each position.
@@ -55,11 +57,13 @@ impl Surfaces<'_> {
     /// Subtracts the fronts in the plane of triangle `t` from it, from its corners outwards;
     /// returns these fronts if nothing is left.
     fn covers(&self, t: usize) -> Option<Vec<u32>> {
-        // Light passes it from either side.
-        if self.scene.is_clear(t) {
+        let (corners, normal) = (self.scene.corners(t), self.normals[t]);
+        let touching = || self.corners[t].iter().flat_map(|&v| self.meeting_at(v));
+        let covers_some = |&s: &u32| self.cover(t, (corners, normal), s as usize).is_some();
+        // Light passes a clear triangle from either side.
+        if self.scene.is_clear(t) || !touching().any(covers_some) {
             return None;
         }
-        let (corners, normal) = (self.scene.corners(t), self.scene.normal(t));
         // Slivers between outlines stay open by rounding.
         let still_open = 1e-6 * self.scene.area(t);
         let mut open = vec![corners.to_vec()];
@@ -97,7 +101,7 @@ impl Surfaces<'_> {
         (corners, normal): ([DVec3; 3], DVec3),
         s: usize,
     ) -> Option<[DVec3; 3]> {
-        if normal.dot(self.scene.normal(s)) >= 0.0 || self.scene.is_clear(s) {
+        if normal.dot(self.normals[s]) >= 0.0 || self.scene.is_clear(s) {
             return None;
         }
         let of_s = self.scene.corners(s);

@@ -20,8 +20,8 @@ pub(crate) const MAX_LEVELS: u32 = 31;
 /// Maximum number of boxes in a leaf: the triangles of one pack, four 32-bit lanes.
 pub(super) const MAX_LEAF_SIZE: usize = 4;
 
-/// Number of bins along an axis, between which splits are tried. Plain choice; no recorded
-/// measurement.
+/// Maximum number of bins along an axis, between which splits are tried: one per box. Plain choice;
+/// no recorded measurement.
 const SAH_BINS: usize = 32;
 
 /// An axis-aligned box in 32 bits.
@@ -149,15 +149,18 @@ fn split(boxes: &[Aabb32], part: &mut [u32], levels: u32) -> (usize, f32) {
     let centre = |k: u32| boxes[k as usize].centre();
     let around = |all: Aabb32, &k: &u32| all.union(&Aabb32 { low: centre(k), high: centre(k) });
     let centres = part.iter().fold(Aabb32::EMPTY, around);
-    let scale = SAH_BINS as f32 / centres.size();
+    let bins = part.len().min(SAH_BINS);
+    let scale = bins as f32 / centres.size();
     // If all centres coincide along an axis, NaN makes that bin 0.
-    let bin = |k: u32| ((centre(k) - centres.low) * scale).to_array().map(|x| x as usize);
-    let bin = |k: u32, axis: usize| bin(k)[axis].min(SAH_BINS - 1);
-    match best_sah_split(boxes, part, bin, levels) {
+    let bin = |k: u32| {
+        let position = ((centre(k) - centres.low) * scale).to_array();
+        position.map(|x| (x as usize).min(bins - 1))
+    };
+    match best_sah_split(boxes, part, (bins, &bin), levels) {
         (cost, Some((axis, end))) => {
             let mut middle = 0;
             for i in 0..part.len() {
-                if bin(part[i], axis) < end {
+                if bin(part[i])[axis] < end {
                     part.swap(i, middle);
                     middle += 1;
                 }
@@ -174,24 +177,30 @@ fn split(boxes: &[Aabb32], part: &mut [u32], levels: u32) -> (usize, f32) {
 }
 
 /// The axis and the first bin of the second part with the minimum expected cost, and that cost, see
-/// [`SahBin::cost`].
+/// [`SahBin::cost`]. `bin` gives the bin of a box along each axis, of their number `count`.
 fn best_sah_split(
     boxes: &[Aabb32],
     part: &[u32],
-    bin: impl Fn(u32, usize) -> usize,
+    (count, bin): (usize, &impl Fn(u32) -> [usize; 3]),
     levels: u32,
 ) -> (f32, Option<(usize, usize)>) {
+    let mut bins = [[SahBin::EMPTY; SAH_BINS]; 3];
+    for &k in part {
+        for (bins, bin) in bins.iter_mut().zip(bin(k)) {
+            bins[bin].add(1, &boxes[k as usize]);
+        }
+    }
     let mut best = (f32::INFINITY, None);
-    for axis in 0..3 {
-        let mut bins = [SahBin::EMPTY; SAH_BINS];
-        part.iter().for_each(|&k| bins[bin(k, axis)].add(1, &boxes[k as usize]));
-        let mut behind = bins;
-        for k in (1..SAH_BINS).rev() {
+    for (axis, bins) in bins.iter().enumerate() {
+        let bins = &bins[..count];
+        let mut behind = [SahBin::EMPTY; SAH_BINS];
+        behind[..count].copy_from_slice(bins);
+        for k in (1..count).rev() {
             let SahBin { count, bounds } = behind[k];
             behind[k - 1].add(count, &bounds);
         }
         let mut before = SahBin::EMPTY;
-        for end in 1..SAH_BINS {
+        for end in 1..count {
             before.add(bins[end - 1].count, &bins[end - 1].bounds);
             let cost = before.cost() + behind[end].cost();
             let within = |part: &SahBin| part.count > 0 && part.levels() <= levels;
