@@ -108,15 +108,20 @@ pub(super) fn noise_tolerance(target: f64) -> f64 {
     3.0 * model::allowed_sampling(target)
 }
 
-/// `gather` with as many rays as bring `sampling`, the error of those it has, down to its share of
-/// the `target`.
-pub(super) fn with_rays_for(gather: &GatherSettings, sampling: f64, target: f64) -> GatherSettings {
+/// `gather` with as many rays for each of the first `vertices` as bring `sampling`, the error of
+/// those it has, down to its share of the `target`.
+pub(super) fn with_rays_for(
+    gather: &GatherSettings,
+    sampling: f64,
+    target: f64,
+    vertices: usize,
+) -> GatherSettings {
     let allowed = model::allowed_sampling(target);
     let rays = f64::from(gather.rays) * model::ray_factor(sampling, allowed);
     let mut chosen = gather.clone();
-    // They come in powers of two; too few would have all vertices gather again.
-    let rays = rays.clamp(*model::RAYS.start(), *model::RAYS.end());
-    chosen.rays = (rays.ceil() as u32).next_power_of_two();
+    // They come in powers of two.
+    let rays = rays.max(model::min_rays(vertices)).min(*model::RAYS.end());
+    chosen.rays = 1 << rays.log2().round() as u32;
     chosen.noise_tolerance = noise_tolerance(target);
     chosen
 }
@@ -397,17 +402,20 @@ mod tests {
     fn pilot_chooses_rays_by_sampling_law() {
         let gather = settings();
         let allowed = model::allowed_sampling(0.02);
-        let rays = |sampling: f64| with_rays_for(&gather, sampling, 0.02).rays;
+        let many = 1 << 20;
+        let rays = |sampling: f64| with_rays_for(&gather, sampling, 0.02, many).rays;
         assert_eq!(rays(allowed), gather.rays.next_power_of_two());
         for sampling in [1.2, 2.0, 4.0, 9.0].map(|times| times * allowed) {
-            // As many as it takes, and less than twice as many.
+            // The power of two nearest to what it takes.
             let needed =
                 f64::from(gather.rays) * (sampling / allowed).powf(1.0 / model::RQMC_EXPONENT);
             let excess = f64::from(rays(sampling)) / needed;
-            assert!((1.0..2.0 + 1e-3).contains(&excess), "{sampling}: {excess}");
+            assert!((0.7..1.5).contains(&excess), "{sampling}: {excess}");
             assert!(rays(sampling).is_power_of_two());
         }
-        assert_eq!(with_rays_for(&gather, 0.0, 0.02).rays, 128);
-        assert_eq!(with_rays_for(&gather, 1e9, 0.02).rays, 65536);
+        assert_eq!((rays(0.0), rays(1e9)), (64, 65536));
+        // Of few vertices each has more than noise asks for.
+        let rays = [1 << 14, 1 << 13, 1].map(|few| with_rays_for(&gather, 0.0, 0.02, few).rays);
+        assert_eq!(rays, [128, 256, 512]);
     }
 }

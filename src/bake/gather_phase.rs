@@ -174,15 +174,17 @@ impl<'a> GatherPhase<'a> {
 
     /// The gatherer of the settings, with rays divided by `divisor`.
     fn gatherer(&self, divisor: u32) -> Result<Box<dyn Gather + 'a>, Error> {
-        let rays = self.gather.rays.div_ceil(divisor);
+        let rays =
+            self.gather.rays.div_ceil(divisor).max(model::MIN_COARSE_RAYS.min(self.gather.rays));
         let noise = self.gather.noise_tolerance * f64::from(divisor);
         self.backend.gather(&self.shot.mesh, rays, noise, self.state.radiosity_floor())
     }
 
-    /// The gatherer at centroids: 128 rays, more where halves of them differ by 15 %. With fewer
-    /// there are false alarms; more cost as much as a vertex.
+    /// The gatherer at centroids: as many rays as a vertex, 128 at most, and more where halves of them
+    /// differ by 15 %.
     fn probe_gatherer(&self) -> Result<Box<dyn Gather + 'a>, Error> {
-        self.backend.gather(&self.shot.mesh, 128, 0.15, self.state.radiosity_floor())
+        let rays = self.gather.rays.min(128);
+        self.backend.gather(&self.shot.mesh, rays, 0.15, self.state.radiosity_floor())
     }
 
     /// What makes the rows by which vertices exchange all further bounces.
@@ -333,7 +335,8 @@ impl<'a> GatherPhase<'a> {
         let mut gatherer = self.backend.gather(&self.shot.mesh, self.gather.rays, noise, dim)?;
         let Pilot { sampling, radiosity_floor } = pilot.pilot(256, &mut *gatherer)?;
         self.state.set_radiosity_floor(radiosity_floor);
-        let chosen = controller::with_rays_for(&self.gather, sampling, target.error);
+        let vertices = self.state.vertices();
+        let chosen = controller::with_rays_for(&self.gather, sampling, target.error, vertices);
         let settings = self.settings(chosen);
         if let (solve, Some(gather)) = target.overridden(settings) {
             self.solve = solve;
