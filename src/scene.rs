@@ -430,6 +430,15 @@ impl Scene {
         self.derived.get(|| make(self))
     }
 
+    /// The same scene with what was computed of `other` by [`Scene::derived`], of this type: for a
+    /// scene that does not differ in what it is computed from.
+    pub(crate) fn with_derived_of<T: Any + Send + Sync>(self, other: &Scene) -> Scene {
+        if let Some(known) = other.derived.known::<T>() {
+            self.derived.keep(known);
+        }
+        self
+    }
+
     /// The comments before the geometry of its file, without `#`: often the program that wrote it.
     pub(crate) fn comments(&self) -> &[String] {
         &self.comments

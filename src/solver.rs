@@ -40,6 +40,7 @@ mod step;
 use std::time::Duration;
 
 use crate::error::{Error, ErrorKind};
+use crate::mesh::Mesh;
 pub use crate::progress::StopReason;
 use crate::scene::Rgb;
 pub(crate) use flux_state::ReceivedLight;
@@ -94,6 +95,22 @@ impl Progress {
 }
 
 impl Solution {
+    /// The emission of `mesh`, none of it passed on.
+    pub(crate) fn nothing_shot(mesh: &Mesh) -> Solution {
+        let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(|e| mesh.exitance(e)).collect();
+        let flux = |(e, b): (usize, &Rgb)| *b * mesh.solid_area(mesh.element(e));
+        let emitted = radiosity.iter().enumerate().map(flux).sum();
+        Solution {
+            ledger: Ledger { emitted, unshot: emitted, ..Ledger::default() },
+            radiosity,
+            method: Method::Shooting { overshoot: false },
+            steps: 0,
+            shots: 0,
+            rows_made: 0,
+            stop: StopReason::Shots,
+        }
+    }
+
     /// Σ weight × solution: combines lights that were solved separately on the same mesh. Weights
     /// are per channel and ≥ 0. Radiosity and ledger are linear in the emission. Steps, shots and
     /// rows are sums over all parts; the stop reason is the first that is not

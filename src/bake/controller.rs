@@ -2,6 +2,8 @@
 
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
+use std::time::Instant;
+
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 
 /// An error to be reached.
@@ -13,6 +15,17 @@ pub(super) struct ErrorTarget<'a> {
     pub each_group: bool,
     /// Changes the settings after every choice of the bake.
     pub overrides: &'a dyn Fn(&mut BakeSettings),
+    /// Of a bake within a time: when that is over, and the error to which it goes on meanwhile.
+    pub within: Option<Within>,
+}
+
+/// A limit of time, and what to do with time that is left.
+#[derive(Clone, Copy)]
+pub(super) struct Within {
+    /// When the estimate of the error has to be done.
+    pub deadline: Instant,
+    /// The error at which the bake ends earlier, in [0, 1).
+    pub least_error: f64,
 }
 
 /// The errors that are compared with a target.
@@ -26,6 +39,25 @@ pub(super) struct TargetErrors<'e> {
 }
 
 impl ErrorTarget<'_> {
+    /// The smallest error that the bake may have in the end, as far as that is known.
+    pub fn finest(&self) -> f64 {
+        self.within.map_or(self.error, |within| within.least_error.max(0.05).min(self.error))
+    }
+
+    /// Whether the time is over.
+    pub fn is_late(&self) -> bool {
+        self.within.is_some_and(|within| Instant::now() >= within.deadline)
+    }
+
+    /// The next target of a bake that goes on from one with these errors, if it does.
+    pub fn next(&self, errors: TargetErrors) -> Option<Self> {
+        let least = self.within?.least_error;
+        let groups = self.required(errors.groups).map(|group| cautious(&group.estimate));
+        let reached = groups.fold(errors.whole.total.max(errors.by_light.total), f64::max);
+        let error = (reached * model::IMPROVEMENT_IN_TIME).min(self.error).max(least);
+        (self.error > least && error > 0.0).then_some(ErrorTarget { error, ..*self })
+    }
+
     /// Whether the estimate is below the target by the margin of safety, so that the bake can end.
     pub fn is_met(&self, errors: TargetErrors) -> bool {
         let limit = model::SAFETY * self.error;
@@ -77,6 +109,8 @@ pub(super) fn cautious(estimate: &ErrorEstimate) -> f64 {
 /// What has to be done for vertices to be as the settings say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
+    /// All vertices gather what is emitted, and exchange it, by few rays; then all passes.
+    FirstLight,
     /// All gather passes, from the light that was shot.
     AllPasses,
     /// All vertices gather once more, after a `bounce` what they gathered themselves; then elements
@@ -269,7 +303,7 @@ mod tests {
     }
 
     fn target(error: f64, each_group: bool) -> ErrorTarget<'static> {
-        ErrorTarget { error, each_group, overrides: &|_| () }
+        ErrorTarget { error, each_group, overrides: &|_| (), within: None }
     }
 
     fn errors<'e>(whole: &'e ErrorEstimate, groups: &'e [GroupError]) -> TargetErrors<'e> {

@@ -46,10 +46,10 @@ pub(super) fn negligible_reflection(scene: &Scene) -> f64 {
 }
 
 /// Whether an estimate continues after `samples` points: of a bake that was stopped, up to the
-/// minimum of any other.
-pub(super) fn goes_on(stopped: bool, samples: usize) -> ControlFlow<()> {
+/// minimum of any other; not where it `is_late`.
+pub(super) fn goes_on(stopped: bool, is_late: bool, samples: usize) -> ControlFlow<()> {
     let enough = stopped && samples >= model::MIN_SAMPLES;
-    if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    if enough || is_late { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 /// A result whose error is to be estimated.
@@ -94,6 +94,9 @@ pub(super) struct Pilot {
     pub sampling: f64,
     /// Reflected radiosity below which errors are relative to this instead, W/m².
     pub radiosity_floor: f64,
+    /// The reflected radiosity that, if all surfaces had it, would have the least error, W/m² per
+    /// channel.
+    pub even: Rgb,
 }
 
 impl EstimatedError {
@@ -184,8 +187,15 @@ impl ErrorEstimator<'_> {
         let radiosity_floor = self.floor(&observations, &strata);
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mut sums = [(0.0, 0.0); 2];
+        // Of Σ w |c − B|²/m², over the points, the minimum is at c = Σ w B/m² / Σ w/m².
+        let (mut even, mut weights) = (Rgb::ZERO, 0.0);
         for observation in observations.iter().filter(|observation| !observation.excluded) {
             let [a, b] = observation.gathered;
+            let mean = (a + b) / 2.0;
+            let weight = observation.weight * strata[observation.stratum].area
+                / mean.length().max(radiosity_floor).powi(2);
+            even += weight * mean;
+            weights += weight;
             let light = a.length().max(observation.interpolated.length());
             let square = ((a - b) / light.max(radiosity_floor)).length_squared() / 2.0;
             let area = observation.weight * strata[observation.stratum].area;
@@ -195,7 +205,8 @@ impl ErrorEstimator<'_> {
         }
         let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
         let sampling = (AVERAGED_VARIANCE * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt();
-        Ok(Pilot { sampling, radiosity_floor })
+        let even = if weights > 0.0 { even / weights } else { Rgb::ZERO };
+        Ok(Pilot { sampling, radiosity_floor, even })
     }
 
     /// Reflected radiosity below which errors are relative to this instead, W/m²: by what was

@@ -36,6 +36,7 @@ use crate::light::PathTracer;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
 use crate::sampling::octaves::Octaves;
+use crate::scene::Rgb;
 use crate::verify::octaves_of;
 
 /// Vertices that gather what was shot.
@@ -52,6 +53,9 @@ pub(super) struct GatherPhase<'a> {
     validator: Validator<'a>,
     paths: PathTracer<'a>,
     octaves: Octaves,
+    /// Reflected radiosity of all surfaces that is the least error before any vertex has gathered,
+    /// W/m² per channel.
+    even: Rgb,
 }
 
 /// A gathered mesh whose error was estimated.
@@ -104,6 +108,7 @@ impl<'a> GatherPhase<'a> {
             validator,
             paths,
             octaves,
+            even: Rgb::ZERO,
         };
         if let Some(target) = target {
             phase.choose_rays(light, target)?;
@@ -118,7 +123,7 @@ impl<'a> GatherPhase<'a> {
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Result<BakedLight, Error> {
-        let mut step = Step::AllPasses;
+        let mut step = if self.is_first_light() { Step::FirstLight } else { Step::AllPasses };
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
         loop {
@@ -136,12 +141,20 @@ impl<'a> GatherPhase<'a> {
                 estimated = self.validate(estimated, reporter, clock);
                 next = self.next_step(&estimated, rounds_left)?;
             }
+            previous_gathers = gathers;
+            rounds += 1;
+            if matches!(next, Next::End(Outcome::Reached))
+                && let Some(target) = self.target.and_then(|t| t.next(estimated.error.errors()))
+                && !estimated.cancelled
+            {
+                self.target = Some(target);
+                (rounds, previous_gathers, idle_rounds) = (0, 0, 0);
+                next = self.next_step(&estimated, 12)?;
+            }
             match next {
                 Next::Step(next) => step = next,
                 Next::End(outcome) => return Ok(self.into_result(estimated, outcome)),
             }
-            previous_gathers = gathers;
-            rounds += 1;
         }
     }
 
@@ -172,6 +185,11 @@ impl<'a> GatherPhase<'a> {
         })
     }
 
+    /// Whether the source is what is emitted, of which nothing was shot.
+    fn is_first_light(&self) -> bool {
+        self.shot.solution.stop == StopReason::Shots && self.shot.solution.shots == 0
+    }
+
     /// The gatherer of the settings, with rays divided by `divisor`.
     fn gatherer(&self, divisor: u32) -> Result<Box<dyn Gather + 'a>, Error> {
         let rays =
@@ -180,8 +198,8 @@ impl<'a> GatherPhase<'a> {
         self.backend.gather(&self.shot.mesh, rays, noise, self.state.radiosity_floor())
     }
 
-    /// The gatherer at centroids: as many rays as a vertex, 128 at most, and more where halves of them
-    /// differ by 15 %.
+    /// The gatherer at centroids: as many rays as a vertex, 128 at most, and more where halves of
+    /// them differ by 15 %.
     fn probe_gatherer(&self) -> Result<Box<dyn Gather + 'a>, Error> {
         let rays = self.gather.rays.min(128);
         self.backend.gather(&self.shot.mesh, rays, 0.15, self.state.radiosity_floor())
@@ -198,6 +216,10 @@ impl<'a> GatherPhase<'a> {
         let refinement = self.gather.refinement.clone();
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
+            Step::FirstLight => match self.first_light(&mut progress)? {
+                StopReason::Cancelled => Ok(StopReason::Cancelled),
+                _ => self.gather(Step::AllPasses, reporter),
+            },
             Step::AllPasses => {
                 let mut probes = self.probe_gatherer()?;
                 let is_single = refinement.gather_passes <= 1;
@@ -237,6 +259,29 @@ impl<'a> GatherPhase<'a> {
         }
     }
 
+    /// All vertices gather what is emitted and exchange it, by few rays. Where that is stopped on
+    /// the way, what they would have exchanged is added evenly (the ambient term of Cohen et al.
+    /// 1988).
+    fn first_light(
+        &mut self,
+        progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
+    ) -> Result<StopReason, Error> {
+        // Without near fields: what is near is dark in the source, which is no solution.
+        let mut gatherer =
+            self.backend.gather_evenly(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
+        let rows = RayGather::new(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
+        if self.state.gather_all(&mut *gatherer, progress)? == StopReason::Cancelled {
+            return Ok(StopReason::Cancelled);
+        }
+        let stop = self.state.add_further_bounces(&rows, progress);
+        if stop == StopReason::Cancelled {
+            let albedo = self.shot.mesh.mean_albedo();
+            self.state
+                .add_even_light(self.even * albedo / (Rgb::ONE - albedo).max(Rgb::splat(0.05)));
+        }
+        Ok(stop)
+    }
+
     /// What was gathered as a mesh, with its estimated error.
     fn estimate(
         &mut self,
@@ -248,7 +293,7 @@ impl<'a> GatherPhase<'a> {
         clock.timings.vertices += clock.lap();
         let estimator = ErrorEstimator {
             light: &light,
-            lit_by: Some(self.state.source()),
+            lit_by: self.state.has_gathered_all().then(|| self.state.source()),
             element_residual: &element_residual,
             ledger: &self.shot.solution.ledger,
             bounces: self.state.bounces(),
@@ -267,10 +312,11 @@ impl<'a> GatherPhase<'a> {
             },
         };
         let mut cancelled = stop == StopReason::Cancelled;
+        let target = self.target;
         let error = loop {
             let error = estimator.estimate(counts, &mut *self.gatherer, &mut |samples, of| {
                 cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-                estimator::goes_on(cancelled, samples)
+                estimator::goes_on(cancelled, target.is_some_and(|t| t.is_late()), samples)
             })?;
             let undecided = |target: ErrorTarget| target.is_undecided(error.errors());
             // Up to 768 points per group and 16 times as many in total: a round that splits
@@ -296,18 +342,35 @@ impl<'a> GatherPhase<'a> {
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Estimated {
-        let Estimated { light, error, mut cancelled } = estimated;
+        let Estimated { light, mut error, mut cancelled } = estimated;
         let was_stopped = cancelled;
         let paths = match was_stopped {
+            true if self.target.is_some_and(|target| target.within.is_some()) => {
+                // Vertices before and after a bounce make no series of bounces.
+                error.whole.uncertainty = error.whole.total;
+                [validator::LEAST_PATHS; 2]
+            }
             true => [validator::MIN_PATHS; 2],
-            false => validator::paths(light.gather_count, self.gather.rays),
+            false => {
+                let [paths, in_doubt] = validator::paths(light.gather_count, self.gather.rays);
+                // A group of a few points is in doubt more often than the whole.
+                let each_group = self.target.is_some_and(|target| target.each_group);
+                [if each_group { in_doubt } else { paths }, in_doubt]
+            }
         };
-        let target = self.target.map(|target| target.error);
-        let error = self.validator.validate(error, &light, target, paths, &mut |samples, of| {
-            cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-            let stop = cancelled && !was_stopped;
-            if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+        let target = self.target;
+        let error = self.validator.validate(
+            error,
+            &light,
+            target.map(|t| t.error),
+            paths,
+            &mut |samples, of| {
+                cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+                let is_late = target.is_some_and(|target| target.is_late());
+                let stop = cancelled && !was_stopped || is_late;
+                if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            },
+        );
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(error.whole)).is_break();
         Estimated { light, error, cancelled }
@@ -332,9 +395,17 @@ impl<'a> GatherPhase<'a> {
         // of them everywhere.
         let noise = controller::noise_tolerance(target.error);
         let dim = self.state.radiosity_floor();
-        let mut gatherer = self.backend.gather(&self.shot.mesh, self.gather.rays, noise, dim)?;
-        let Pilot { sampling, radiosity_floor } = pilot.pilot(256, &mut *gatherer)?;
+        let (mesh, rays) = (&self.shot.mesh, self.gather.rays);
+        let mut gatherer = match self.is_first_light() {
+            true => self.backend.gather_evenly(mesh, rays)?,
+            false => self.backend.gather(mesh, rays, noise, dim)?,
+        };
+        let Pilot { sampling, radiosity_floor, even } = pilot.pilot(256, &mut *gatherer)?;
         self.state.set_radiosity_floor(radiosity_floor);
+        if self.is_first_light() {
+            self.even = even;
+            self.state.add_even_light(even);
+        }
         let vertices = self.state.vertices();
         let chosen = controller::with_rays_for(&self.gather, sampling, target.error, vertices);
         let settings = self.settings(chosen);

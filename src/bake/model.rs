@@ -11,14 +11,13 @@
 //! | unshot | share u of the flux not yet shot | u | shots: ln 1/u; after that, gather passes |
 //! | sources | the same as the mesh | t | vertices |
 //!
-//! The model is used four times:
+//! The model is used three times:
 //!
 //! 1. *Before:* [`BakeSettings::for_error`](crate::BakeSettings::for_error) computes settings from
 //!    an error by power laws.
 //! 2. *After a pilot:* a few points that gather twice give the number of rays.
 //! 3. *After every estimate:* parts above `water_filling_cap` are lowered to it, each by its own
 //!    law in one step of bounded size.
-//! 4. *Within a time:* cost = constant · error^−p gives the next error.
 //!
 //! Constants without another source were chosen on three scenes (`scenes/cornell_box.obj`, a room
 //! lit from the next room, a room with many small boxes) so that measured errors are at or below
@@ -95,13 +94,17 @@ pub(super) fn hemicube_resolution(error: f64) -> u32 {
 pub(super) const RAYS: RangeInclusive<f64> = 64.0..=65536.0;
 
 /// Minimum number of rays that a pilot chooses for each of the first `vertices`: 2^21 in total, as
-/// many as a validation has paths, up to 512 each. Noise is seen before it counts: with 128, 512 and
-/// 2048 rays, pictures of the Cornell box baked to 10 % were off by 0.053, 0.041 and 0.040 (mean of
-/// FLIP, Andersson et al. 2020), of a room lit from the next one by 0.085, 0.062 and 0.057. These
-/// bakes took 0.9, 0.9 and 1.6 s, and 2.3, 2.4 and 3.1 s.
+/// many as a validation has paths, up to 512 each. Noise is seen before it counts: with 128, 512
+/// and 2048 rays, pictures of the Cornell box baked to 10 % were off by 0.053, 0.041 and 0.040
+/// (mean of FLIP, Andersson et al. 2020), of a room lit from the next one by 0.085, 0.062 and
+/// 0.057. These bakes took 0.9, 0.9 and 1.6 s, and 2.3, 2.4 and 3.1 s.
 pub(super) fn min_rays(vertices: usize) -> f64 {
     (f64::from(1 << 21) / vertices.max(1) as f64).clamp(*RAYS.start(), 512.0)
 }
+
+/// Rays of a vertex, and of its row, by which light is first known where time is limited. Plain
+/// choice.
+pub(super) const RAYS_OF_FIRST_LIGHT: u32 = 16;
 
 /// Minimum number of rays of a gather that only lights the next one. With 16 a city of 18 454
 /// triangles was split into four times as many elements by their noise.
@@ -121,11 +124,11 @@ pub(super) fn rays_of_rows(rays: u32, vertices: usize) -> u32 {
     rays.div_ceil(COARSE_RAY_DIVISOR).min(u32::try_from(most).unwrap_or(u32::MAX))
 }
 
-/// Error that sampling may have before the first estimate. The cost, vertices times rays, ∝
-/// m^−[`VERTEX_EXPONENT`] s^−1/[`RQMC_EXPONENT`] for errors m of the mesh and s of sampling, is
-/// minimal under m² + s² = allowed² where s² = 0.45 allowed².
+/// Error that sampling may have before the first estimate: a quarter of the squared error. Vertices
+/// times rays are minimal at 0.45 of it, but elements are split for noise too: with that a floor
+/// that a window lights had five times as many vertices.
 pub(super) fn allowed_sampling(target: f64) -> f64 {
-    0.67 * allowed_error(target)
+    0.5 * allowed_error(target)
 }
 
 // ---- Rounds of refinement ----------------------------------------------------------------------
@@ -209,6 +212,9 @@ pub(super) fn noise_step(error: f64, cap: f64) -> f64 {
 pub(super) fn mesh_step(error: f64, cap: f64) -> f64 {
     (cap / error).clamp(0.5, 1.0 / MIN_STEP)
 }
+
+/// A bake within a time goes on to this share of the error that it has: about twice the vertices.
+pub(super) const IMPROVEMENT_IN_TIME: f64 = 0.75;
 
 // ---- Estimation of the error -------------------------------------------------------------------
 

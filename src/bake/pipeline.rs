@@ -11,13 +11,14 @@ use crate::bake::model;
 use crate::bake::progress::{BakeProgress, ProgressCallback, Reporter, StageClock};
 use crate::bake::result::BakeResult;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
-use crate::bake::shooting_phase;
+use crate::bake::shooting_phase::{self, ShotLight};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::mesh::{Mesh, cut_at_contacts, cut_large_triangles};
 use crate::progress::StopReason;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
+use crate::visibility::ray_scene::RayScene;
 
 impl BakeSettings {
     /// Bakes `scene` as far as these settings go, without regard to the estimated error.
@@ -46,44 +47,98 @@ pub(super) fn run(
     target: Option<ErrorTarget>,
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
-    settings.check()?;
     let backend = &ResilientBackend::new(backend);
-    let mut reporter = Reporter { backend, callback: progress };
-    let mut clock = StageClock::start();
-    let scene = &cut_scene(settings, scene, target);
-    let shot = shooting_phase::shoot(&settings.solve, scene, backend, &mut reporter, &mut clock)?;
-    let by_elements = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
-    let baked = match &settings.gather {
-        Some(gather) if shot.solution.stop != StopReason::Cancelled => {
-            let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
-            GatherPhase::new(settings, gather, target, mesh, &by_elements, &shot, backend)?
-                .run(&mut reporter, &mut clock)?
-        }
-        _ => shooting_phase::estimate_elements(
-            &shot,
-            settings,
-            target,
-            by_elements,
-            backend,
-            &mut reporter,
-            &mut clock,
-        )?,
+    let mut pipeline = Pipeline::new(settings, backend, target, progress)?;
+    let shot = pipeline.shoot(scene)?;
+    pipeline.finish(shot)
+}
+
+/// The same by vertices alone: they gather what is emitted, and exchange what they have. Nothing is
+/// shot, and triangles are cut along walls if elements are split there.
+pub(super) fn run_without_shooting(
+    settings: &BakeSettings,
+    scene: &Arc<Scene>,
+    backend: &Backend,
+    target: ErrorTarget,
+    progress: ProgressCallback,
+) -> Result<BakeResult, Error> {
+    let backend = &ResilientBackend::new(backend);
+    let pipeline = Pipeline::new(settings, backend, Some(target), progress)?;
+    let splits_at_contacts = |gather: &GatherSettings| gather.contact_levels > 0;
+    let scene = match settings.gather.as_ref().is_some_and(splits_at_contacts) {
+        true => cut_scene(settings, scene, Some(target)),
+        false => with_creases(scene, model::crease_degrees(target.finest())),
     };
-    Ok(BakeResult {
-        mesh: shot.mesh,
-        solution: shot.solution,
-        light: baked.light,
-        estimate: baked.estimate,
-        groups: baked.groups,
-        outcome: baked.outcome,
-        settings: baked.settings,
-        hemicubes: shot.hemicubes,
-        row_maker: shot.row_maker,
-        hemicubes_by_resolution: shot.hemicubes_by_resolution,
-        mean_near_correction: shot.mean_near_correction,
-        device_failure: backend.failure(),
-        timings: clock.timings,
-    })
+    let sizing = settings.solve.sizing(&scene, settings.solve.element_size);
+    let mesh = Mesh::sized(scene, &sizing, model::MAX_SHOOTING_DEPTH)?;
+    pipeline.finish(ShotLight::nothing(mesh))
+}
+
+/// The phases of a bake, and what all of them need.
+struct Pipeline<'p> {
+    settings: &'p BakeSettings,
+    backend: &'p ResilientBackend<'p>,
+    target: Option<ErrorTarget<'p>>,
+    reporter: Reporter<'p>,
+    clock: StageClock,
+}
+
+impl<'p> Pipeline<'p> {
+    fn new(
+        settings: &'p BakeSettings,
+        backend: &'p ResilientBackend<'p>,
+        target: Option<ErrorTarget<'p>>,
+        progress: ProgressCallback<'p>,
+    ) -> Result<Pipeline<'p>, Error> {
+        settings.check()?;
+        let reporter = Reporter { backend, callback: progress };
+        Ok(Pipeline { settings, backend, target, reporter, clock: StageClock::start() })
+    }
+
+    /// Cuts `scene` and shoots its light.
+    fn shoot(&mut self, scene: &Arc<Scene>) -> Result<ShotLight, Error> {
+        let Pipeline { settings, backend, target, reporter, clock } = self;
+        let scene = &cut_scene(settings, scene, *target);
+        shooting_phase::shoot(&settings.solve, scene, backend, reporter, clock)
+    }
+
+    /// Vertices gather what was `shot`.
+    fn finish(self, shot: ShotLight) -> Result<BakeResult, Error> {
+        let Pipeline { settings, backend, target, mut reporter, mut clock } = self;
+        let by_elements = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
+        let baked = match &settings.gather {
+            Some(gather) if shot.solution.stop != StopReason::Cancelled => {
+                let scene = &shot.mesh.shared_scene();
+                let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
+                GatherPhase::new(settings, gather, target, mesh, &by_elements, &shot, backend)?
+                    .run(&mut reporter, &mut clock)?
+            }
+            _ => shooting_phase::estimate_elements(
+                &shot,
+                settings,
+                target,
+                by_elements,
+                backend,
+                &mut reporter,
+                &mut clock,
+            )?,
+        };
+        Ok(BakeResult {
+            mesh: shot.mesh,
+            solution: shot.solution,
+            light: baked.light,
+            estimate: baked.estimate,
+            groups: baked.groups,
+            outcome: baked.outcome,
+            settings: baked.settings,
+            hemicubes: shot.hemicubes,
+            row_maker: shot.row_maker,
+            hemicubes_by_resolution: shot.hemicubes_by_resolution,
+            mean_near_correction: shot.mean_near_correction,
+            device_failure: backend.failure(),
+            timings: clock.timings,
+        })
+    }
 }
 
 /// `scene` as it is meshed: with creases, and cut where a triangle is too large for the region of
@@ -98,7 +153,7 @@ fn cut_scene(
         None => (settings.solve.element_size, model::MAX_PREVIEW_ELEMENTS),
     };
     let scene = match target {
-        Some(target) => &with_creases(scene, model::crease_degrees(target.error)),
+        Some(target) => &with_creases(scene, model::crease_degrees(target.finest())),
         None => scene,
     };
     let scene = match &settings.solve.region {
@@ -111,7 +166,8 @@ fn cut_scene(
 /// `scene`, with creases where it does not say and normals differ by more than this.
 fn with_creases(scene: &Arc<Scene>, degrees: f64) -> Arc<Scene> {
     match scene.triangles().iter().any(|t| t.smoothing.is_none()) {
-        true => Arc::new(scene.with_crease_degrees(degrees)),
+        // Rays do not see creases.
+        true => Arc::new(scene.with_crease_degrees(degrees).with_derived_of::<RayScene>(scene)),
         false => scene.clone(),
     }
 }
@@ -127,6 +183,9 @@ fn first_gather_mesh(
     let sizing = solve.sizing(scene, gather.element_size);
     let sizing = sizing.within(scene, Mesh::MAX_DEPTH, most / 2);
     let mesh = Mesh::sized(scene.clone(), &sizing, Mesh::MAX_DEPTH)?;
+    if gather.contact_levels == 0 {
+        return Ok(mesh);
+    }
     let at_contacts = mesh
         .split_at_contacts(gather.contact_levels)
         .split_beside_cuts(gather.contact_levels, gather.refinement.min_edge);

@@ -46,6 +46,20 @@ pub(super) struct ShotLight {
     pub mean_near_correction: f64,
 }
 
+impl ShotLight {
+    /// The emission of `mesh`, of which nothing is shot.
+    pub fn nothing(mesh: Mesh) -> ShotLight {
+        ShotLight {
+            solution: Solution::nothing_shot(&mesh),
+            mesh,
+            hemicubes: 0,
+            row_maker: RowMaker::Rays,
+            hemicubes_by_resolution: vec![],
+            mean_near_correction: 0.0,
+        }
+    }
+}
+
 /// Shoots the light of `scene`.
 pub(super) fn shoot(
     settings: &SolveSettings,
@@ -167,7 +181,7 @@ pub(super) fn estimate_elements(
     let mut cancelled = settings.gather.is_some() || shot.solution.stop == StopReason::Cancelled;
     let estimated = estimator.estimate(counts, &mut *gatherer, &mut |samples, of| {
         cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-        estimator::goes_on(cancelled, samples)
+        estimator::goes_on(cancelled, false, samples)
     })?;
     let estimated = match target {
         // The estimate of a bake that was stopped is validated, too.

@@ -37,13 +37,13 @@ pub enum BakeTarget {
     Error(f64),
     /// The same for every group of the scene, however small its share of the area is.
     ErrorEach(f64),
-    /// Wall time, above 0. The scene is baked to one error after the other, each chosen by how long
-    /// those before took, for as long as another fits in. What is not done in time is stopped, and
-    /// the one of least estimated error is returned, stopped or not.
+    /// Wall time, above 0. Vertices gather what is emitted and exchange it, and the bake goes on to
+    /// one error after the other, each from the light of the one before; nothing is shot. When the
+    /// time is over, what there is comes back with its estimated error. A tenth is left to that
+    /// estimate; the time is exceeded where reading the geometry alone takes longer.
     Time(Duration),
-    /// An error, but no longer than a wall time: bakes to errors that fit into it, as for
-    /// [`BakeTarget::Time`], which end when this one is reached. [`BakeResult::outcome`] tells
-    /// whether it was.
+    /// An error, but no longer than a wall time: as [`BakeTarget::Time`], ended when this error is
+    /// reached. [`BakeResult::outcome`] tells whether it was.
     Within {
         /// As in [`BakeTarget::Error`].
         error: f64,
@@ -89,12 +89,12 @@ impl BakeTarget {
     /// `overrides` is called with all settings whenever the bake has chosen some: once at the start
     /// of a bake to an error, with those of [`BakeSettings::for_error`]; once when the number of
     /// rays was chosen by what a few of them find; and after every estimate above the target, with
-    /// those of the next round. Within a time, that is repeated for each error that is tried. It
-    /// may change any setting, and must set the same ones to the same values at every call: what it
-    /// sets stays, and the bake changes the others. Settings of the solve count at the first call
+    /// those of the next round; within a time for each further error too. It may change any
+    /// setting, and must set the same ones to the same values at every call: what it sets stays,
+    /// and the bake changes the others. Settings of the solve count at the first call
     /// only, since light is shot once; [`BakeSettings::gather`] may be taken away at the first call
     /// and not later; within a time [`checkpoint`](crate::bake::SolveSettings::checkpoint) has no
-    /// effect, since it would be that of many solves.
+    /// effect, since nothing is shot.
     ///
     /// # Errors
     /// Those of [`BakeTarget::bake`], and [`ErrorKind::Setting`] for a setting out of range.
@@ -110,7 +110,7 @@ impl BakeTarget {
         match self {
             BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => {
                 let each_group = matches!(self, BakeTarget::ErrorEach(_));
-                let target = ErrorTarget { error, each_group, overrides: &overrides };
+                let target = ErrorTarget { error, each_group, overrides: &overrides, within: None };
                 bake_to_error(target, scene, backend, &mut progress)
             }
             BakeTarget::Time(time) => {
@@ -119,7 +119,7 @@ impl BakeTarget {
             }
             BakeTarget::Within { error, each_group, time } => {
                 check_time(time)?;
-                let goal = ErrorTarget { error, each_group, overrides: &overrides };
+                let goal = ErrorTarget { error, each_group, overrides: &overrides, within: None };
                 bake_in_time(time, Some(goal), scene, backend, &overrides, &mut progress)
             }
         }

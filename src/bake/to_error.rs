@@ -32,10 +32,15 @@ pub(super) fn bake_to_error(
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
     check_error(target.error)?;
+    pipeline::run(&settings_for(&target, scene), scene, backend, Some(target), progress)
+}
+
+/// The settings that `target` begins with.
+pub(super) fn settings_for(target: &ErrorTarget, scene: &Scene) -> BakeSettings {
     let mut settings = BakeSettings::for_error(target.error, scene);
     if target.each_group {
         settings.scale_groups(target.error, scene);
     }
     (target.overrides)(&mut settings);
-    pipeline::run(&settings, scene, backend, Some(target), progress)
+    settings
 }

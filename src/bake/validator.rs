@@ -38,6 +38,9 @@ const SIGMAS_PER_GROUP: f64 = 3.0;
 /// Minimum of the limits of paths per measurement.
 pub(super) const MIN_PATHS: u64 = 1 << 18;
 
+/// The same where the time is over: the first of all points, some 50 ms on two cores.
+pub(super) const LEAST_PATHS: u64 = 1 << 14;
+
 /// Limits of paths per measurement, for `gathers` at vertices by `rays` each: one path per 32 rays;
 /// and the same where it is in doubt whether the error is met, at least 2^21, of a second or two.
 /// In a gap of 1 cm above a lamp the estimate of a small box was 7 % and its error 17.5 ± 2.1 %,

@@ -113,6 +113,8 @@ pub(crate) struct AdaptiveGather<'a> {
     pass: u32,
     /// Whether the source has all bounces.
     has_all_bounces: bool,
+    /// Whether all vertices have gathered.
+    has_gathered_all: bool,
     /// Times that elements have been split, over all passes.
     refinements: u32,
     /// Points at which light was gathered.
@@ -139,6 +141,7 @@ impl<'a> AdaptiveGather<'a> {
             relative_change: 0.0,
             pass: 0,
             has_all_bounces: false,
+            has_gathered_all: false,
             refinements: 0,
             gather_count: 0,
         }
@@ -159,6 +162,12 @@ impl<'a> AdaptiveGather<'a> {
         if self.has_all_bounces { f64::INFINITY } else { f64::from(self.pass + 1) }
     }
 
+    /// Whether all vertices have gathered once: before that their values do not follow from the
+    /// source.
+    pub fn has_gathered_all(&self) -> bool {
+        self.has_gathered_all
+    }
+
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub fn radiosity_floor(&self) -> f64 {
         self.scale.radiosity_floor
@@ -167,6 +176,17 @@ impl<'a> AdaptiveGather<'a> {
     /// Sets [`AdaptiveGather::radiosity_floor`], which is that of the source light at the start.
     pub fn set_radiosity_floor(&mut self, floor: f64) {
         self.scale.radiosity_floor = floor;
+    }
+
+    /// Adds the same irradiance at all vertices, by which they reflect this radiosity on average,
+    /// W/m² per channel.
+    pub fn add_even_light(&mut self, reflected: Rgb) {
+        let SampledMesh { mesh, vertices, reflected: values, .. } = &mut self.samples;
+        let irradiance = reflected / mesh.mean_albedo().max(Rgb::splat(f64::MIN_POSITIVE));
+        let points = VertexGatherPoints::new(mesh, vertices, self.scale.touching());
+        for (v, value) in (0..).zip(values) {
+            *value += points.albedo(v) * irradiance;
+        }
     }
 
     /// What was reached so far.
@@ -257,6 +277,21 @@ impl<'a> AdaptiveGather<'a> {
         self.gather_pass(settings, last, probes, progress)
     }
 
+    /// Gathers the source at all vertices; nothing is split.
+    pub fn gather_all(
+        &mut self,
+        gatherer: &mut dyn Gather,
+        progress: &mut ProgressCallback,
+    ) -> Result<StopReason, Error> {
+        let before = self.samples.reflected.clone();
+        if self.gather(&self.all_vertices(), gatherer, progress)?.is_break() {
+            return Ok(StopReason::Cancelled);
+        }
+        self.has_gathered_all = true;
+        self.relative_change = self.samples.relative_change(&before);
+        Ok(StopReason::Converged)
+    }
+
     /// Gathers the source at all vertices, then refines.
     pub fn gather_pass(
         &mut self,
@@ -265,11 +300,9 @@ impl<'a> AdaptiveGather<'a> {
         probes: Option<&mut (dyn Gather + '_)>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
-        let before = self.samples.reflected.clone();
-        if self.gather(&self.all_vertices(), gatherer, progress)?.is_break() {
+        if self.gather_all(gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
-        self.relative_change = self.samples.relative_change(&before);
         self.refine(settings, gatherer, probes, progress)
     }
 

@@ -19,18 +19,27 @@ impl Derived {
     /// waits for a part of the work may take other work that needs the same value, and then both
     /// compute it.
     pub fn get<T: Any + Send + Sync>(&self, make: impl FnOnce() -> T) -> Arc<T> {
-        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = |all: &[Arc<dyn Any + Send + Sync>]| {
-            all.iter().find_map(|value| Arc::clone(value).downcast().ok())
-        };
-        if let Some(kept) = kept(&all()) {
-            return kept;
+        match self.known() {
+            Some(known) => known,
+            None => self.keep(Arc::new(make())),
         }
-        let made = Arc::new(make());
-        let mut all = all();
-        kept(&all).unwrap_or_else(|| {
-            all.push(made.clone());
-            made
+    }
+
+    /// The value, if it was computed.
+    pub fn known<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
+        find(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Keeps `value`, unless there is one; the one that is kept.
+    pub fn keep<T: Any + Send + Sync>(&self, value: Arc<T>) -> Arc<T> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        find(&all).unwrap_or_else(|| {
+            all.push(value.clone());
+            value
         })
     }
+}
+
+fn find<T: Any + Send + Sync>(values: &[Arc<dyn Any + Send + Sync>]) -> Option<Arc<T>> {
+    values.iter().find_map(|value| Arc::clone(value).downcast().ok())
 }

@@ -40,6 +40,8 @@ use repeated::repeated_triangles;
 use sheets::{LIT_SHARE, Samples, Sheets, SideIndex, SideStatistics};
 use walks::Walks;
 
+use super::ray_scene::RayScene;
+
 impl Scene {
     /// The same scene with [`Sides`] applied: triangles of [`Sides::Auto`] are flipped so that
     /// light reaches their fronts, and a second triangle with reversed corners is added wherever
@@ -81,7 +83,10 @@ impl Scene {
             (WarningKind::Winding, count(|t| t.turned), "turned"),
             (WarningKind::BothSides, count(|t| t.doubled), "reflecting on both"),
         ];
-        scene = scene.treated(&treatments);
+        scene = match treatments.iter().all(|treatment| *treatment == Treatment::default()) {
+            true => scene.treated(&treatments).with_derived_of::<RayScene>(&scene),
+            false => scene.treated(&treatments),
+        };
         for (kind, groups, done) in warnings.into_iter().filter(|(_, groups, _)| !groups.is_empty())
         {
             let names = groups.iter().map(|&g| self.groups()[g as usize].as_str());

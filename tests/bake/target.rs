@@ -98,39 +98,44 @@ fn two_runs_give_the_same_bits() {
 }
 
 #[test]
-fn time_target_returns_what_is_off_least() {
-    // No time at all: what was reached, which is little, comes back at once.
+fn a_bake_within_a_time_goes_on_from_what_it_has() {
+    // No time at all: light that is the same everywhere comes back at once, less than all off.
     let target = BakeTarget::Time(Duration::from_nanos(1));
     let none = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
-    assert_eq!(none.solution.stop, StopReason::Cancelled);
+    assert_eq!(none.light.stop, StopReason::Cancelled);
     assert_eq!(none.light.surface.error.len(), none.light.surface.positions.len());
-    // Time enough on any machine: stopped by hand as the second attempt starts to shoot.
+    assert!(none.light.surface.radiosity.iter().any(|&b| b != Rgb::ZERO));
+    // Time enough on any machine: stopped by hand after so many estimates. Each begins from what
+    // was gathered for the one before.
     let target = BakeTarget::Time(Duration::from_secs(1 << 30));
-    let (mut estimated, mut stopped) = (false, false);
-    let progress = |stage: &BakeProgress| {
-        estimated |= matches!(stage, BakeProgress::Estimated(_));
-        stopped |= estimated && matches!(stage, BakeProgress::Shooting(_));
-        if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let after = |estimates: usize| {
+        let (mut told, mut gathered) = (vec![], 0);
+        let progress = |stage: &BakeProgress| {
+            match stage {
+                BakeProgress::Estimated(estimate) => told.push(estimate.total),
+                BakeProgress::Gathering(_) => gathered += 1,
+                BakeProgress::Shooting(_) => panic!("nothing is shot"),
+                _ => (),
+            }
+            match told.len() >= estimates {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let baked = target.bake(cornell(), &Backend::Cpu, progress).unwrap();
+        assert_eq!(baked.solution.shots, 0);
+        (baked.light.gather_count, baked.estimate.total)
     };
-    let first = target.bake(cornell(), &Backend::Cpu, progress).unwrap();
-    assert!(stopped, "a second attempt was begun");
-    assert_eq!(first.solution.stop, StopReason::Converged);
-    assert_eq!(first.light.stop, StopReason::Converged);
-    assert!(first.estimate.total < none.estimate.total);
-    // Stopped after its first estimate, the second attempt is better than the whole of the first.
-    let (mut told, mut attempt) = ([f64::INFINITY; 2], 0);
-    let progress = |stage: &BakeProgress| {
-        match stage {
-            BakeProgress::Shooting(_) if told[0].is_finite() => attempt = 1,
-            BakeProgress::Estimated(estimate) => told[attempt] = estimate.total,
-            _ => (),
-        }
-        if told[1].is_finite() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let target = BakeTarget::Time(Duration::from_secs(600));
-    let second = target.bake(cornell(), &Backend::Cpu, progress).unwrap();
-    println!("{told:?}");
-    assert!(told[1] < told[0] && second.estimate.total == told[1]);
+    let (first, last) = (after(1), after(10));
+    println!("{first:?} {last:?}");
+    // Two or three times, each to at most three quarters of the error before.
+    assert!(last.0 > first.0 && last.1 < 0.7 * first.1);
+    // With an error it ends there, and not later.
+    let time = Duration::from_secs(1 << 30);
+    let target = BakeTarget::Within { error: 0.05, each_group: false, time };
+    let baked = target.bake(cornell(), &Backend::Cpu, keep_going).unwrap();
+    assert_eq!(baked.outcome, Outcome::Reached);
+    assert!(baked.estimate.total <= 0.05 && baked.estimate.total > 0.01);
 }
 
 #[test]

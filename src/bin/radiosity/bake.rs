@@ -59,7 +59,7 @@ pub struct Bake {
     #[arg(long, value_name = "FILE.json", hide = true)]
     bands: Option<PathBuf>,
     /// Write the state of the solve to this file while it runs, and resume from the file where it
-    /// exists; not with --time, which solves several times
+    /// exists; not with --time, which shoots nothing
     #[arg(long, value_name = "FILE", hide = true)]
     state: Option<PathBuf>,
     #[command(flatten)]
@@ -152,7 +152,7 @@ impl Bake {
         let device = self.device.open()?;
         let baking = Instant::now();
         let mut baked = progress::of_bake(|unshot_goal, report| {
-            self.bake(scene, &device, unshot_goal, report)
+            self.bake(scene, &device, start, unshot_goal, report)
         })?;
         let band_light = bands::light(bands.as_ref(), &baked)?;
         let stopped = interrupt::stopped();
@@ -190,11 +190,13 @@ impl Bake {
         Ok(report)
     }
 
-    /// The bake itself; `unshot_goal` is set to the share of unshot light that it goes down to.
+    /// The bake itself, of a program that began at `start`; `unshot_goal` is set to the share of
+    /// unshot light that it goes down to.
     fn bake(
         &self,
         scene: Scene,
         device: &Backend,
+        start: Instant,
         unshot_goal: &Cell<f64>,
         progress: progress::OfBake,
     ) -> Result<BakeResult, Error> {
@@ -202,7 +204,10 @@ impl Bake {
             self.adjust(settings);
             unshot_goal.set(settings.solve.solver.unshot);
         };
-        let target = match (self.target(), self.limit()) {
+        // What reading took is part of the time.
+        let left =
+            |time: Duration| time.saturating_sub(start.elapsed()).max(Duration::from_millis(1));
+        let target = match (self.target(), self.limit().map(left)) {
             (Target::Error(error), None) => BakeTarget::Error(error),
             (Target::Error(error), Some(time)) => {
                 BakeTarget::Within { error, each_group: false, time }
@@ -211,7 +216,9 @@ impl Bake {
             (Target::ErrorEach(error), Some(time)) => {
                 BakeTarget::Within { error, each_group: true, time }
             }
-            (Target::Seconds(seconds), _) => BakeTarget::seconds(seconds)?,
+            (Target::Seconds(seconds), _) => {
+                BakeTarget::Time(left(Duration::try_from_secs_f64(seconds).unwrap_or_default()))
+            }
             (Target::Settings(gather), _) => {
                 let mut settings = match gather {
                     Gather::None => BakeSettings::elements_only(&scene),
