@@ -358,19 +358,12 @@ impl<'a> GatherPhase<'a> {
                 [if each_group { in_doubt } else { paths }, in_doubt]
             }
         };
-        let target = self.target;
-        let error = self.validator.validate(
-            error,
-            &light,
-            target.map(|t| t.error),
-            paths,
-            &mut |samples, of| {
-                cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
-                let is_late = target.is_some_and(|target| target.is_late());
-                let stop = cancelled && !was_stopped || is_late;
-                if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            },
-        );
+        let target = self.target.map(|target| target.error);
+        let error = self.validator.validate(error, &light, target, paths, &mut |samples, of| {
+            cancelled |= reporter.report(BakeProgress::Estimating { samples, of }).is_break();
+            let stop = cancelled && !was_stopped;
+            if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(error.whole)).is_break();
         Estimated { light, error, cancelled }
