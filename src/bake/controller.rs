@@ -39,7 +39,8 @@ pub(super) struct TargetErrors<'e> {
 }
 
 impl ErrorTarget<'_> {
-    /// The smallest error that the bake may have in the end, as far as that is known.
+    /// The smallest error that the bake may have in the end, as far as that is known: within a time
+    /// alone, 5 %.
     pub fn finest(&self) -> f64 {
         self.within.map_or(self.error, |within| within.least_error.max(0.05).min(self.error))
     }

@@ -192,13 +192,12 @@ impl ErrorEstimator<'_> {
         for observation in observations.iter().filter(|observation| !observation.excluded) {
             let [a, b] = observation.gathered;
             let mean = (a + b) / 2.0;
-            let weight = observation.weight * strata[observation.stratum].area
-                / mean.length().max(radiosity_floor).powi(2);
+            let area = observation.weight * strata[observation.stratum].area;
+            let weight = area / mean.length().max(radiosity_floor).powi(2);
             even += weight * mean;
             weights += weight;
             let light = a.length().max(observation.interpolated.length());
             let square = ((a - b) / light.max(radiosity_floor)).length_squared() / 2.0;
-            let area = observation.weight * strata[observation.stratum].area;
             for (sum, weight) in sums.iter_mut().zip([area, area * light]) {
                 *sum = (sum.0 + weight * square, sum.1 + weight);
             }

@@ -39,6 +39,9 @@ use crate::sampling::octaves::Octaves;
 use crate::scene::Rgb;
 use crate::verify::octaves_of;
 
+/// Maximum number of rounds of refinement to one target. Plain choice.
+const MAX_ROUNDS: u32 = 12;
+
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
     /// What was used to shoot; shown to the target's overrides only.
@@ -123,18 +126,18 @@ impl<'a> GatherPhase<'a> {
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Result<BakedLight, Error> {
-        let mut step = if self.is_first_light() { Step::FirstLight } else { Step::AllPasses };
+        let mut step = if self.is_within_time() { Step::FirstLight } else { Step::AllPasses };
         let mut rounds = 0;
         let (mut previous_gathers, mut idle_rounds) = (0, 0);
         loop {
             let stop = self.gather(step, reporter)?;
             let mut estimated = self.estimate(stop, reporter, clock)?;
             // A round is idle if it raises the number of gathers by less than 1 %; two idle rounds
-            // are the last, as are twelve of any kind.
+            // are the last, as are MAX_ROUNDS of any kind.
             let gathers = estimated.light.gather_count;
             let has_progress = gathers as f64 >= 1.01 * previous_gathers as f64;
             idle_rounds = if has_progress { 0 } else { idle_rounds + 1 };
-            let rounds_left = if idle_rounds >= 2 { 0 } else { 12 - rounds };
+            let rounds_left = if idle_rounds >= 2 { 0 } else { MAX_ROUNDS - rounds };
             let mut next = self.next_step(&estimated, rounds_left)?;
             if matches!(next, Next::End(_)) {
                 // By gathers the bake ends; paths may measure a larger error.
@@ -149,7 +152,7 @@ impl<'a> GatherPhase<'a> {
             {
                 self.target = Some(target);
                 (rounds, previous_gathers, idle_rounds) = (0, 0, 0);
-                next = self.next_step(&estimated, 12)?;
+                next = self.next_step(&estimated, MAX_ROUNDS)?;
             }
             match next {
                 Next::Step(next) => step = next,
@@ -185,9 +188,10 @@ impl<'a> GatherPhase<'a> {
         })
     }
 
-    /// Whether the source is what is emitted, of which nothing was shot.
-    fn is_first_light(&self) -> bool {
-        self.shot.solution.stop == StopReason::Shots && self.shot.solution.shots == 0
+    /// Whether the bake is one within a time, of which nothing was shot: the source is what is
+    /// emitted.
+    fn is_within_time(&self) -> bool {
+        self.target.is_some_and(|target| target.within.is_some())
     }
 
     /// The gatherer of the settings, with rays divided by `divisor`.
@@ -345,7 +349,7 @@ impl<'a> GatherPhase<'a> {
         let Estimated { light, mut error, mut cancelled } = estimated;
         let was_stopped = cancelled;
         let paths = match was_stopped {
-            true if self.target.is_some_and(|target| target.within.is_some()) => {
+            true if self.is_within_time() => {
                 // Vertices before and after a bounce make no series of bounces.
                 error.whole.uncertainty = error.whole.total;
                 [validator::LEAST_PATHS; 2]
@@ -389,13 +393,13 @@ impl<'a> GatherPhase<'a> {
         let noise = controller::noise_tolerance(target.error);
         let dim = self.state.radiosity_floor();
         let (mesh, rays) = (&self.shot.mesh, self.gather.rays);
-        let mut gatherer = match self.is_first_light() {
+        let mut gatherer = match self.is_within_time() {
             true => self.backend.gather_evenly(mesh, rays)?,
             false => self.backend.gather(mesh, rays, noise, dim)?,
         };
         let Pilot { sampling, radiosity_floor, even } = pilot.pilot(256, &mut *gatherer)?;
         self.state.set_radiosity_floor(radiosity_floor);
-        if self.is_first_light() {
+        if self.is_within_time() {
             self.even = even;
             self.state.add_even_light(even);
         }

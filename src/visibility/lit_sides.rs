@@ -34,13 +34,12 @@ use rayon::prelude::*;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::sampling::hash::split_mix64;
 use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
+use crate::visibility::ray_scene::RayScene;
 use closed_rooms::closed_rooms;
 use lamp_backs::LampBacks;
 use repeated::repeated_triangles;
 use sheets::{LIT_SHARE, Samples, Sheets, SideIndex, SideStatistics};
 use walks::Walks;
-
-use super::ray_scene::RayScene;
 
 impl Scene {
     /// The same scene with [`Sides`] applied: triangles of [`Sides::Auto`] are flipped so that
@@ -83,9 +82,10 @@ impl Scene {
             (WarningKind::Winding, count(|t| t.turned), "turned"),
             (WarningKind::BothSides, count(|t| t.doubled), "reflecting on both"),
         ];
+        let treated = scene.treated(&treatments);
         scene = match treatments.iter().all(|treatment| *treatment == Treatment::default()) {
-            true => scene.treated(&treatments).with_derived_of::<RayScene>(&scene),
-            false => scene.treated(&treatments),
+            true => treated.with_derived_of::<RayScene>(&scene),
+            false => treated,
         };
         for (kind, groups, done) in warnings.into_iter().filter(|(_, groups, _)| !groups.is_empty())
         {

@@ -216,9 +216,7 @@ impl Bake {
             (Target::ErrorEach(error), Some(time)) => {
                 BakeTarget::Within { error, each_group: true, time }
             }
-            (Target::Seconds(seconds), _) => {
-                BakeTarget::Time(left(Duration::try_from_secs_f64(seconds).unwrap_or_default()))
-            }
+            (Target::Seconds(_), _) => BakeTarget::Time(left(self.time.unwrap_or_default())),
             (Target::Settings(gather), _) => {
                 let mut settings = match gather {
                     Gather::None => BakeSettings::elements_only(&scene),
