@@ -15,6 +15,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::accuracy::Measure;
+use crate::accuracy::tail::Ranking;
 use crate::bake::controller::TargetErrors;
 use crate::bake::error_estimate::{
     self, AVERAGED_VARIANCE, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError,
@@ -185,10 +186,10 @@ impl ErrorEstimator<'_> {
         let mut proceed = |_, _| ControlFlow::Continue(());
         let (strata, observations) = self.observe(counts, gatherer, &mut proceed)?;
         let radiosity_floor = self.floor(&observations, &strata);
-        // By area and by light: the larger, so that a dark plane does not hide a lit room.
-        let mut sums = [(0.0, 0.0); 2];
         // Of Σ w |c − B|²/m², over the points, the minimum is at c = Σ w B/m² / Σ w/m².
         let (mut even, mut weights) = (Rgb::ZERO, 0.0);
+        // Areas, light per area, and squared differences.
+        let mut points = vec![];
         for observation in observations.iter().filter(|observation| !observation.excluded) {
             let [a, b] = observation.gathered;
             let mean = (a + b) / 2.0;
@@ -198,12 +199,23 @@ impl ErrorEstimator<'_> {
             weights += weight;
             let light = a.length().max(observation.interpolated.length());
             let square = ((a - b) / light.max(radiosity_floor)).length_squared() / 2.0;
-            for (sum, weight) in sums.iter_mut().zip([area, area * light]) {
-                *sum = (sum.0 + weight * square, sum.1 + weight);
-            }
+            points.push((area, light, square));
         }
-        let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
-        let sampling = (AVERAGED_VARIANCE * sums.map(mean).into_iter().fold(0.0, f64::max)).sqrt();
+        let errors: Vec<(f64, f64)> =
+            points.iter().map(|&(area, _, square)| (area, square)).collect();
+        let kept = Ranking::new(&errors).trimmed(self.measure.tail).kept;
+        // By area and by light: the larger, so that a dark plane does not hide a lit room.
+        let mean = |weigh: fn(f64, f64) -> f64| {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (&(area, light, square), kept) in points.iter().zip(&kept) {
+                let weight = weigh(kept * area, light);
+                sum += weight * square;
+                weights += weight;
+            }
+            if weights > 0.0 { sum / weights } else { 0.0 }
+        };
+        let square = mean(|area, _| area).max(mean(|area, light| area * light));
+        let sampling = (AVERAGED_VARIANCE * square).sqrt();
         let even = if weights > 0.0 { even / weights } else { Rgb::ZERO };
         Ok(Pilot { sampling, radiosity_floor, even })
     }

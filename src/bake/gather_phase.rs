@@ -202,10 +202,11 @@ impl<'a> GatherPhase<'a> {
         self.backend.gather(&self.shot.mesh, rays, noise, self.state.radiosity_floor())
     }
 
-    /// The gatherer at centroids: as many rays as a vertex, 128 at most, and more where halves of
-    /// them differ by 15 %.
+    /// The gatherer at centroids: half as many rays as a vertex, 64 at most, and more where halves
+    /// of them differ by 15 %. With all of the rays, 128 at most, three scenes were split into the
+    /// same elements and a city into more, in 3 to 38 % more time.
     fn probe_gatherer(&self) -> Result<Box<dyn Gather + 'a>, Error> {
-        let rays = self.gather.rays.min(128);
+        let rays = (self.gather.rays / 2).clamp(1, 64);
         self.backend.gather(&self.shot.mesh, rays, 0.15, self.state.radiosity_floor())
     }
 
@@ -231,9 +232,9 @@ impl<'a> GatherPhase<'a> {
                     Some(_) if is_single => Some(self.bounce_rows()?),
                     _ => None,
                 };
-                let mut coarse = match self.target {
-                    None if is_single => None,
-                    _ => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
+                let mut coarse = match is_single {
+                    true => None,
+                    false => Some(self.gatherer(model::COARSE_RAY_DIVISOR)?),
                 };
                 let gatherers = Gatherers {
                     last: &mut *self.gatherer,
@@ -274,7 +275,8 @@ impl<'a> GatherPhase<'a> {
         let mut gatherer =
             self.backend.gather_evenly(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
         let rows = RayGather::new(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
-        if self.state.gather_all(&mut *gatherer, progress)? == StopReason::Cancelled {
+        let settings = self.gather.refinement.clone();
+        if self.state.gather_all(&settings, &mut *gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
         let stop = self.state.add_further_bounces(&rows, progress);

@@ -36,6 +36,7 @@ use super::sampled_mesh::{SampledMesh, after_split};
 use super::shadow_edges::resolve_shadow_edges;
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
+use super::vertex_weights::vertex_weights;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
 use crate::accuracy::tail::Ranking;
@@ -55,8 +56,7 @@ pub(crate) struct Gatherers<'g> {
     pub coarse: Option<&'g mut dyn Gather>,
     /// At the centroids of elements, in the last pass.
     pub probes: Option<&'g mut dyn Gather>,
-    /// Rows of all vertices: after a pass with the settings of the last one by the coarse gatherer,
-    /// they exchange all further bounces, which the last pass gathers.
+    /// Rows of all vertices, by which they exchange all further bounces of what they have gathered.
     pub bounces: Option<&'g dyn PointRows>,
 }
 
@@ -236,7 +236,8 @@ impl<'a> AdaptiveGather<'a> {
     }
 
     /// All passes: those before the last with coarser tolerances, since each vertex of the next
-    /// averages their errors over its hemisphere.
+    /// averages their errors over its hemisphere. Where vertices exchange all further bounces, these
+    /// are added to what the last pass gathered, and only new vertices gather after that.
     pub fn run_passes(
         &mut self,
         settings: &RefinementSettings,
@@ -253,38 +254,31 @@ impl<'a> AdaptiveGather<'a> {
             }
             self.promote_to_source();
         }
-        if let Some(rows) = bounces {
-            let gatherer: &mut dyn Gather = match coarse {
-                Some(coarse) => coarse,
-                None => &mut *last,
-            };
-            // What others receive of an edge of light is blurred. With edges 1 or 3 times as long
-            // the errors of four scenes are alike, and the Cornell box on a wide plane, each group
-            // to 10 %, takes 34 or 15 s.
-            let mut first = coarser(settings, 1);
-            // A quarter of the rays has 4^0.75 times the noise, which would split the few elements
-            // of a small group.
-            if settings.group_scales.is_empty() {
-                first.mesh_error = settings.mesh_error;
-            }
-            if self.gather_pass(&first, gatherer, probes.as_deref_mut(), progress)?
-                == StopReason::Cancelled
-                || self.add_further_bounces(rows, progress) == StopReason::Cancelled
-            {
-                return Ok(StopReason::Cancelled);
-            }
+        let Some(rows) = bounces else {
+            return self.gather_pass(settings, last, probes, progress);
+        };
+        // What others receive of an edge of light is blurred. With edges 1 or 3 times as long the
+        // errors of four scenes are alike, and the Cornell box on a wide plane, each group to 10 %,
+        // takes 34 or 15 s.
+        let min_edge = coarser(settings, 1).min_edge;
+        let first = RefinementSettings { min_edge, ..settings.clone() };
+        if self.gather_pass(&first, last, probes.as_deref_mut(), progress)? == StopReason::Cancelled
+            || self.add_further_bounces(rows, progress) == StopReason::Cancelled
+        {
+            return Ok(StopReason::Cancelled);
         }
-        self.gather_pass(settings, last, probes, progress)
+        self.refine(settings, last, probes, progress)
     }
 
     /// Gathers the source at all vertices; nothing is split.
     pub fn gather_all(
         &mut self,
+        settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
         let before = self.samples.reflected.clone();
-        if self.gather(&self.all_vertices(), gatherer, progress)?.is_break() {
+        if self.gather(&self.all_vertices(), settings, gatherer, progress)?.is_break() {
             return Ok(StopReason::Cancelled);
         }
         self.has_gathered_all = true;
@@ -300,7 +294,7 @@ impl<'a> AdaptiveGather<'a> {
         probes: Option<&mut (dyn Gather + '_)>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
-        if self.gather_all(gatherer, progress)? == StopReason::Cancelled {
+        if self.gather_all(settings, gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
         self.refine(settings, gatherer, probes, progress)
@@ -374,7 +368,7 @@ impl<'a> AdaptiveGather<'a> {
             self.probes.split(&marked);
             known = after_split(&known, &marked, None);
             self.refinements += 1;
-            if self.gather(&new_vertices, gatherer, progress)?.is_break() {
+            if self.gather(&new_vertices, settings, gatherer, progress)?.is_break() {
                 return Ok(StopReason::Cancelled);
             }
         }
@@ -479,9 +473,11 @@ impl<'a> AdaptiveGather<'a> {
     fn gather(
         &mut self,
         vertices: &[u32],
+        settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
+        let weights = vertex_weights(&self.samples, &self.scale, settings);
         let SampledMesh {
             mesh,
             vertices: mesh_vertices,
@@ -506,7 +502,8 @@ impl<'a> AdaptiveGather<'a> {
             let mut queue = &pending[..];
             while !queue.is_empty() {
                 let batch = batch_sizer.next(&mut queue, |vertices| {
-                    let points = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
+                    let point = |&v: &u32| points.point(v, attempt).weighing(weights[v as usize]);
+                    let points = vertices.par_iter().map(point).collect();
                     gather_batch(vertices, points, &source, gatherer)
                 })?;
                 let unresolved = batch.unresolved(&points, attempt);
@@ -626,6 +623,29 @@ mod tests {
     }
 
     #[test]
+    fn vertices_that_exchange_bounces_gather_once() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
+        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(|e| mesh.exitance(e)).collect();
+        let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
+        let mut rays = RayGather::new(&mesh, 16).unwrap();
+        let rows = RayGather::new(&mesh, 16).unwrap();
+        let mut state = AdaptiveGather::new(mesh, &light, None, Measure::default());
+        let gatherers =
+            Gatherers { last: &mut rays, coarse: None, probes: None, bounces: Some(&rows) };
+        let settings = RefinementSettings::new(1e9);
+        let proceed = &mut |_: &Progress| ControlFlow::Continue(());
+        let mut once = state.clone();
+        once.gather_all(&settings, &mut RayGather::new(&once.samples.mesh, 16).unwrap(), proceed)
+            .unwrap();
+        state.run_passes(&settings, gatherers, proceed).unwrap();
+        // And has a row; a few points of the first are tried again in other elements.
+        let counts = [state.gather_count, once.gather_count];
+        assert!(once.vertices() as u64 <= counts[1] && counts[0] <= 2 * counts[1], "{counts:?}");
+        assert_eq!(state.bounces(), f64::INFINITY);
+    }
+
+    #[test]
     fn further_bounces_are_those_of_passes() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
         let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
@@ -646,7 +666,7 @@ mod tests {
         for _ in 0..30 {
             by_passes.promote_to_source();
             let all = by_passes.all_vertices();
-            let _ = by_passes.gather(&all, &mut rays, &mut proceed).unwrap();
+            let _ = by_passes.gather(&all, &settings, &mut rays, &mut proceed).unwrap();
         }
         let (mut off, mut added, mut total) = (0.0, 0.0, 0.0);
         for (v, first) in first.iter().enumerate() {

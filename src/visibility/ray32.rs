@@ -12,10 +12,12 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3A, Vec4};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
+use glam::{DVec3, Vec3A};
 
 use crate::geometry::aabb::Aabb;
 
+use super::collapse::WIDTH;
 use super::sah_tree::Aabb32;
 
 /// Longest side of the scene in the hierarchy's own unit. Plain choice: products of three of them
@@ -34,8 +36,16 @@ pub(super) struct LocalUnit {
     scale: f64,
 }
 
-/// Eight boxes: planes of their low and high sides along x, y and z, four per vector.
-pub(super) type BoxPlanes = [[[Vec4; 2]; 3]; 2];
+/// Eight 32-bit lanes in memory, aligned for one load.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct Lanes(pub [f32; WIDTH]);
+
+/// Eight boxes: planes of their low and high sides along x, y and z.
+pub(super) type BoxPlanes = [[Lanes; 3]; 2];
+
+/// The same in registers.
+pub(super) type LoadedPlanes<S> = [[f32x8<S>; 3]; 2];
 
 /// A ray in the hierarchy's unit. Distances are in units of its direction.
 #[derive(Clone, Copy, Debug)]
@@ -103,28 +113,44 @@ pub(super) fn rounded_up(distance: f64) -> f32 {
     (rounded + 4.0 * f32::EPSILON * rounded.abs() + BOX_MARGIN).min(f32::MAX)
 }
 
+/// The planes relative to `origin`.
 #[inline(always)]
-pub(super) fn splat(v: Vec3A) -> [Vec4; 3] {
-    v.to_array().map(Vec4::splat)
+pub(super) fn planes_from<S: Simd>(
+    simd: S,
+    planes: &BoxPlanes,
+    origin: &[f32x8<S>; 3],
+) -> LoadedPlanes<S> {
+    let [low, high] = planes;
+    let from = |plane: &Lanes, axis: usize| f32x8::load_array_ref(simd, &plane.0) - origin[axis];
+    [
+        [from(&low[0], 0), from(&low[1], 1), from(&low[2], 2)],
+        [from(&high[0], 0), from(&high[1], 1), from(&high[2], 2)],
+    ]
+}
+
+/// The three components, each in all lanes.
+#[inline(always)]
+pub(super) fn splat<S: Simd, V: SimdBase<S, Element = f32>>(simd: S, v: Vec3A) -> [V; 3] {
+    let [x, y, z] = v.to_array();
+    [V::splat(simd, x), V::splat(simd, y), V::splat(simd, z)]
 }
 
 impl Ray32 {
     /// Mask of the boxes, of eight, that the ray hits between start and end, one bit each, and the
-    /// distances of entry. `plane` returns the planes of [`BoxPlanes`] relative to the ray's
-    /// origin.
+    /// distances of entry. The planes are relative to the ray's origin.
     #[inline(always)]
-    pub fn meets(&self, plane: impl Fn(usize, usize, usize) -> Vec4) -> (u32, [[f32; 4]; 2]) {
-        let inverse = splat(self.inverse);
+    pub fn meets<S: Simd>(&self, simd: S, planes: &LoadedPlanes<S>) -> (u32, f32x8<S>) {
+        let inverse: [f32x8<S>; 3] = splat(simd, self.inverse);
         let [x, y, z] = self.near_sides.map(|side| side & 1);
-        let (start, end) = (Vec4::splat(self.start), Vec4::splat(self.end));
-        let (mut hits, mut entries) = (0, [[0.0; 4]; 2]);
-        for (half, entries) in entries.iter_mut().enumerate() {
-            let at = |side, axis: usize| plane(side, axis, half) * inverse[axis];
-            let entry = at(x, 0).max(at(y, 1)).max(at(z, 2).max(start));
-            let exit = at(x ^ 1, 0).min(at(y ^ 1, 1)).min(at(z ^ 1, 2).min(end));
-            hits |= entry.cmple(exit).bitmask() << (4 * half);
-            *entries = entry.to_array();
-        }
-        (hits, entries)
+        let [near_x, near_y, near_z] =
+            [planes[x][0] * inverse[0], planes[y][1] * inverse[1], planes[z][2] * inverse[2]];
+        let [far_x, far_y, far_z] = [
+            planes[x ^ 1][0] * inverse[0],
+            planes[y ^ 1][1] * inverse[1],
+            planes[z ^ 1][2] * inverse[2],
+        ];
+        let entry = near_x.max(near_y).max(near_z.max(f32x8::splat(simd, self.start)));
+        let exit = far_x.min(far_y).min(far_z.min(f32x8::splat(simd, self.end)));
+        (entry.simd_le(exit).to_bitmask() as u32, entry)
     }
 }

@@ -18,6 +18,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use arrayvec::ArrayVec;
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
@@ -44,6 +45,8 @@ pub(crate) struct RayScene {
     unit: LocalUnit,
     /// `None` if no triangle has holes.
     cut_outs: Option<CutOuts>,
+    /// Vector instructions of this machine.
+    level: Level,
 }
 
 impl RayScene {
@@ -64,7 +67,7 @@ impl RayScene {
         let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.to_local(corner)));
         let plane = |&k: &u32| TrianglePlane::new(indices[k as usize], corners(k));
         let triangles = tree.order.par_iter().map(plane).collect();
-        RayScene { bvh, tree, triangles, unit, cut_outs: None }
+        RayScene { bvh, tree, triangles, unit, cut_outs: None, level: Level::new() }
     }
 
     /// The same scene, in which rays do not hit the backs of `covered` triangles.
@@ -143,9 +146,23 @@ impl RayScene {
         ignored: Option<usize>,
         counts: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
+        dispatch!(self.level, simd => {
+            self.closest_hit_with(simd, (from, direction), start, ignored, counts)
+        })
+    }
+
+    #[inline(always)]
+    fn closest_hit_with<S: Simd>(
+        &self,
+        simd: S,
+        (from, direction): (DVec3, DVec3),
+        start: f64,
+        ignored: Option<usize>,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let (mut ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
-        self.bvh.trace(Child::ROOT, &mut ray, |k| {
+        self.bvh.trace(simd, Child::ROOT, &mut ray, |k| {
             let plane = &self.triangles[k];
             let hit = plane.nearer((from, direction), start, ignored, best)?;
             if !self.is_solid(&hit) || !counts(&hit) {
@@ -171,13 +188,17 @@ impl RayScene {
         while directions.peek().is_some() {
             let stream: ArrayVec<DVec3, MAX_STREAM> =
                 directions.by_ref().take(MAX_STREAM).collect();
-            let hits = self.nearest_of_stream(from, &stream, start, ignored);
+            let hits = dispatch!(self.level, simd => {
+                self.nearest_of_stream(simd, from, &stream, start, ignored)
+            });
             stream.into_iter().zip(hits).for_each(|(direction, hit)| visit(direction, hit));
         }
     }
 
-    fn nearest_of_stream(
+    #[inline(always)]
+    fn nearest_of_stream<S: Simd>(
         &self,
+        simd: S,
         from: DVec3,
         directions: &[DVec3],
         start: f64,
@@ -186,15 +207,20 @@ impl RayScene {
         let mut best: ArrayVec<Option<Hit>, MAX_STREAM> = directions.iter().map(|_| None).collect();
         let local = |&d: &DVec3| self.unit.ray(from, d, start..f64::INFINITY);
         let (mut rays, lengths): (Vec<_>, Vec<f64>) = directions.iter().map(local).unzip();
-        self.bvh.trace_stream(&mut rays, |ray, k| {
-            let plane = &self.triangles[k];
-            let hit = plane.nearer((from, directions[ray]), start, ignored, best[ray])?;
-            if !self.is_solid(&hit) {
-                return None;
-            }
-            best[ray] = Some(hit);
-            Some(rounded_up(hit.distance * lengths[ray]))
-        });
+        self.bvh.trace_stream(
+            simd,
+            &mut rays,
+            #[inline(always)]
+            |ray, k| {
+                let plane = &self.triangles[k];
+                let hit = plane.nearer((from, directions[ray]), start, ignored, best[ray])?;
+                if !self.is_solid(&hit) {
+                    return None;
+                }
+                best[ray] = Some(hit);
+                Some(rounded_up(hit.distance * lengths[ray]))
+            },
+        );
         best
     }
 
@@ -205,11 +231,22 @@ impl RayScene {
         from: DVec3,
         direction: DVec3,
         reach: Range<f64>,
+        counts: impl FnMut(&Hit) -> bool,
+    ) -> bool {
+        dispatch!(self.level, simd => self.occluded_with(simd, (from, direction), reach, counts))
+    }
+
+    #[inline(always)]
+    fn occluded_with<S: Simd>(
+        &self,
+        simd: S,
+        (from, direction): (DVec3, DVec3),
+        reach: Range<f64>,
         mut counts: impl FnMut(&Hit) -> bool,
     ) -> bool {
         let (mut ray, _) = self.unit.ray(from, direction, reach.clone());
         let mut blocked = false;
-        self.bvh.trace(Child::ROOT, &mut ray, |k| {
+        self.bvh.trace(simd, Child::ROOT, &mut ray, |k| {
             let hit = self.triangles[k].intersect(from, direction, reach.clone());
             blocked |= hit.is_some_and(|hit| self.is_solid(&hit) && counts(&hit));
             // Ends the traversal.
@@ -285,13 +322,32 @@ mod tests {
         triangles
     }
 
+    /// Sets of vector instructions that this machine has.
+    fn levels() -> Vec<Level> {
+        let best = Level::new();
+        let mut levels = vec![best, Level::baseline()];
+        #[cfg(target_arch = "x86_64")]
+        {
+            levels.extend(best.as_sse4_2().map(|level| level.level()));
+            levels.extend(best.as_avx2().map(|level| level.level()));
+        }
+        levels
+    }
+
     #[test]
-    fn the_hierarchy_changes_no_hit() {
+    fn the_hierarchy_changes_no_hit_by_any_instructions() {
+        for level in levels() {
+            the_hierarchy_changes_no_hit(level);
+        }
+    }
+
+    fn the_hierarchy_changes_no_hit(level: Level) {
         let hard = hard_triangles();
         for (scale, offset) in [(1.0, DVec3::ZERO), (1e-30, DVec3::ZERO), (1e3, DVec3::splat(1e7))]
         {
             let at = |p: DVec3| scale * p + offset;
             let rays = RayScene::new(hard.iter().map(|corners| corners.map(at)));
+            let rays = RayScene { level, ..rays };
             let mut random = fastrand::Rng::with_seed(2);
             let mut hits = 0;
             for k in 0..200 {
@@ -328,7 +384,7 @@ mod tests {
                 });
                 assert!(each.next().is_none());
             }
-            println!("{hits} hits");
+            println!("{level:?}: {hits} hits");
             assert!(hits > 10_000);
         }
     }

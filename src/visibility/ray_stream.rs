@@ -15,10 +15,10 @@
 //! single remaining ray is traced on its own.
 
 use arrayvec::ArrayVec;
-use glam::Vec4;
+use fearless_simd::{Simd, SimdBase, f32x8};
 
 use super::collapse::WIDTH;
-use super::ray32::{BoxPlanes, Ray32, splat};
+use super::ray32::{LoadedPlanes, Ray32, planes_from, splat};
 use super::wide_bvh::{Child, ChildKind, WideBvh};
 
 /// Maximum number of rays traced together. Their indices are bytes; twice as many are no faster per
@@ -32,31 +32,37 @@ impl WideBvh {
     /// As [`WideBvh::trace`] for each of `rays`, at most [`MAX_STREAM`] from one origin: the first
     /// argument of `may_meet` is the index of the ray.
     #[inline(always)]
-    pub fn trace_stream(
+    pub fn trace_stream<S: Simd>(
         &self,
+        simd: S,
         rays: &mut [Ray32],
         mut may_meet: impl FnMut(usize, usize) -> Option<f32>,
     ) {
         let Some(&Ray32 { origin, .. }) = rays.first() else { return };
+        let origins = splat(simd, origin);
         let mut open = OpenChildren { waiting: (0..rays.len() as u8).collect(), begins: vec![] };
         open.begins.push((Child::ROOT, 0));
         while let Some((child, active)) = open.pop() {
             if let &[ray] = active.as_slice() {
                 let ray = usize::from(ray);
-                self.trace(child, &mut rays[ray], |triangle| may_meet(ray, triangle));
+                self.trace(simd, child, &mut rays[ray], |triangle| may_meet(ray, triangle));
                 continue;
             }
             match child.kind() {
                 ChildKind::Node(node) => {
                     let node = &self.nodes[node];
-                    let (seen, distances) = seen_from(&node.planes, splat(origin));
-                    let plane = |side: usize, axis: usize, half: usize| seen[side][axis][half];
-                    let hit_boxes = |&ray: &u8| rays[usize::from(ray)].meets(plane).0;
-                    let masks: ArrayVec<u32, MAX_STREAM> = active.iter().map(hit_boxes).collect();
-                    let any = masks.iter().fold(0, |any, mask| any | mask);
+                    let planes = planes_from(simd, &node.planes, &origins);
+                    let mut masks = [0_u8; MAX_STREAM];
+                    let mut any = 0;
+                    for (mask, &ray) in masks.iter_mut().zip(&active) {
+                        let (hits, _) = rays[usize::from(ray)].meets(simd, &planes);
+                        *mask = hits as u8;
+                        any |= hits;
+                    }
+                    let distances = squared_distances(simd, &planes).to_array();
                     let mut order: ArrayVec<(u32, usize), WIDTH> = (0..WIDTH)
                         .filter(|&k| any >> k & 1 == 1)
-                        .map(|k| (distances.as_flattened()[k].to_bits(), k))
+                        .map(|k| (distances[k].to_bits(), k))
                         .collect();
                     order.sort_unstable();
                     for &(_, k) in order.iter().rev() {
@@ -65,9 +71,9 @@ impl WideBvh {
                 }
                 ChildKind::Pack(pack) => {
                     let pack = &self.packs[pack];
-                    let seen = pack.seen_from(origin);
+                    let seen = pack.seen_from(simd, origin);
                     for ray in active.iter().map(|&ray| usize::from(ray)) {
-                        seen.trace(pack.first, &mut rays[ray], |k| may_meet(ray, k));
+                        seen.trace(simd, pack.first, &mut rays[ray], |k| may_meet(ray, k));
                     }
                 }
             }
@@ -96,7 +102,7 @@ impl OpenChildren {
 
     /// Adds a child with those of `rays` whose `bit`, by their position among these, is 1.
     #[inline(always)]
-    fn push(&mut self, child: Child, rays: &Rays, bit: impl Fn(usize) -> u32) {
+    fn push(&mut self, child: Child, rays: &Rays, bit: impl Fn(usize) -> u8) {
         let begin = self.waiting.len();
         self.begins.push((child, begin));
         // Without a branch: hits are unpredictable.
@@ -110,18 +116,14 @@ impl OpenChildren {
     }
 }
 
-/// The planes relative to `origin`, and the squared distances to their boxes.
+/// Squared distances from the origin to the boxes, whose planes are relative to it.
 #[inline(always)]
-fn seen_from(planes: &BoxPlanes, origin: [Vec4; 3]) -> (BoxPlanes, [[f32; 4]; 2]) {
-    let mut seen = *planes;
-    let mut squares = [Vec4::ZERO; 2];
+fn squared_distances<S: Simd>(simd: S, [low, high]: &LoadedPlanes<S>) -> f32x8<S> {
+    let none = f32x8::splat(simd, 0.0);
+    let mut squares = none;
     for axis in 0..3 {
-        for half in 0..2 {
-            let [low, high] = [0, 1].map(|side| planes[side][axis][half] - origin[axis]);
-            (seen[0][axis][half], seen[1][axis][half]) = (low, high);
-            let outside = low.max(-high).max(Vec4::ZERO);
-            squares[half] += outside * outside;
-        }
+        let outside = low[axis].max(-high[axis]).max(none);
+        squares = outside * outside + squares;
     }
-    (seen, squares.map(Vec4::into))
+    squares
 }

@@ -17,16 +17,22 @@
 //! total within 64 h r e. t D is off by 14 h r e², and by D's error times t, which no hit in the
 //! scene has above 2 r: within twice 64 h r e².
 
-use glam::{DVec3, Vec3A, Vec4};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x4};
+use glam::{DVec3, Vec3A};
 
 use super::ray32::{Ray32, SCENE_SIZE, splat};
 use super::sah_tree::MAX_LEAF_SIZE;
 
+/// Four 32-bit lanes in memory, aligned for one load.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
+struct Lanes([f32; MAX_LEAF_SIZE]);
+
 /// Up to four triangles in the hierarchy's unit; unused slots are NaN and never hit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePack {
-    corner: [Vec4; 3],
-    edges: [[Vec4; 3]; 2],
+    corner: [Lanes; 3],
+    edges: [[Lanes; 3]; 2],
     /// Length of the longest edge at a corner.
     longest: f32,
     /// Index of the first triangle in the order of the tree.
@@ -34,21 +40,21 @@ pub(super) struct TrianglePack {
 }
 
 /// Terms shared by all rays from one origin.
-pub(super) struct PackSeen {
+pub(super) struct PackSeen<S: Simd> {
     /// Coefficients of the direction: D, u D and v D.
-    normal: [Vec4; 3],
-    u: [Vec4; 3],
-    v: [Vec4; 3],
+    normal: [f32x4<S>; 3],
+    u: [f32x4<S>; 3],
+    v: [f32x4<S>; 3],
     /// t D.
-    rise: Vec4,
+    rise: f32x4<S>,
     /// Margins of u D and v D, and of t D.
-    margins: [Vec4; 2],
+    margins: [f32x4<S>; 2],
 }
 
 impl TrianglePack {
     /// A pack of at most four `triangles`, given by their corners.
     pub fn new(first: usize, triangles: impl Iterator<Item = [DVec3; 3]>) -> TrianglePack {
-        let nothing = [Vec4::NAN; 3];
+        let nothing = [Lanes([f32::NAN; MAX_LEAF_SIZE]); 3];
         let (mut corner, mut edges, mut longest) = (nothing, [nothing; 2], 0.0_f32);
         for (lane, [a, b, c]) in triangles.take(MAX_LEAF_SIZE).enumerate() {
             // In 64 bits, so that edges far shorter than the scene are exact relative to their own
@@ -56,43 +62,47 @@ impl TrianglePack {
             let [a, u, v] = [a, b - a, c - a].map(DVec3::as_vec3a);
             longest = longest.max(u.length()).max(v.length());
             for axis in 0..3 {
-                corner[axis][lane] = a[axis];
-                edges[0][axis][lane] = u[axis];
-                edges[1][axis][lane] = v[axis];
+                corner[axis].0[lane] = a[axis];
+                edges[0][axis].0[lane] = u[axis];
+                edges[1][axis].0[lane] = v[axis];
             }
         }
         TrianglePack { corner, edges, longest, first: first as u32 }
     }
 
     #[inline(always)]
-    pub fn seen_from(&self, origin: Vec3A) -> PackSeen {
-        let o = splat(origin);
-        let s = [0, 1, 2].map(|axis| o[axis] - self.corner[axis]);
-        let [a, b] = &self.edges;
-        let v = cross(&s, a);
+    pub fn seen_from<S: Simd>(&self, simd: S, origin: Vec3A) -> PackSeen<S> {
+        let load = |lanes: &Lanes| f32x4::load_array_ref(simd, &lanes.0);
+        let load = |[x, y, z]: &[Lanes; 3]| [load(x), load(y), load(z)];
+        let (o, corner): ([f32x4<S>; 3], _) = (splat(simd, origin), load(&self.corner));
+        let s = [o[0] - corner[0], o[1] - corner[1], o[2] - corner[2]];
+        let (a, b) = (load(&self.edges[0]), load(&self.edges[1]));
+        let v = cross(&s, &a);
         // 64 roundings.
         let margin = 32.0 * f32::EPSILON * (SCENE_SIZE + origin.abs().max_element()) * self.longest;
+        let rise_margin = 2.0 * margin * self.longest;
         PackSeen {
-            normal: cross(b, a),
-            u: cross(b, &s),
-            rise: dot(b, &v),
+            normal: cross(&b, &a),
+            u: cross(&b, &s),
+            rise: dot(&b, &v),
             v,
-            margins: [margin, 2.0 * margin * self.longest].map(Vec4::splat),
+            margins: [f32x4::splat(simd, margin), f32x4::splat(simd, rise_margin)],
         }
     }
 }
 
-impl PackSeen {
+impl<S: Simd> PackSeen<S> {
     /// Calls `may_meet` with each triangle that `ray` may hit before its end, by their indices in
     /// the order of the tree, where the `first` of the pack is known. It may return a new end.
     #[inline(always)]
     pub fn trace(
         &self,
+        simd: S,
         first: u32,
         ray: &mut Ray32,
         mut may_meet: impl FnMut(usize) -> Option<f32>,
     ) {
-        let mut hits = self.may_meet(ray);
+        let mut hits = self.may_meet(simd, ray);
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize;
             if let Some(end) = may_meet(first as usize + lane) {
@@ -104,26 +114,26 @@ impl PackSeen {
 
     /// Mask of the triangles that `ray` may hit, one bit each.
     #[inline(always)]
-    fn may_meet(&self, ray: &Ray32) -> u32 {
-        let d = splat(ray.direction);
+    fn may_meet(&self, simd: S, ray: &Ray32) -> u32 {
+        let d: [f32x4<S>; 3] = splat(simd, ray.direction);
         let (facing, u, v) = (dot(&d, &self.normal), dot(&d, &self.u), dot(&d, &self.v));
-        let front = facing.cmpge(Vec4::ZERO);
-        let turned = |x: Vec4| Vec4::select(front, x, -x);
-        let (u, v, rise, steep) = (turned(u), turned(v), turned(self.rise), turned(facing));
+        let front = facing.simd_ge(f32x4::splat(simd, 0.0));
+        let (u, v) = (front.select(u, -u), front.select(v, -v));
+        let (rise, steep) = (front.select(self.rise, -self.rise), front.select(facing, -facing));
         let [margin, rise_margin] = self.margins;
-        let inside = u.min(v).cmpge(-margin) & (u + v).cmple(steep + margin + margin);
-        let within =
-            rise.cmpge(steep * ray.start - rise_margin) & rise.cmple(steep * ray.end + rise_margin);
-        (inside & within).bitmask()
+        let inside = u.min(v).simd_ge(-margin) & (u + v).simd_le(steep + margin + margin);
+        let within = rise.simd_ge(steep * ray.start - rise_margin)
+            & rise.simd_le(steep * ray.end + rise_margin);
+        (inside & within).to_bitmask() as u32
     }
 }
 
 #[inline(always)]
-fn cross(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
+fn cross<S: Simd>(a: &[f32x4<S>; 3], b: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]
-fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
+fn dot<S: Simd>(a: &[f32x4<S>; 3], b: &[f32x4<S>; 3]) -> f32x4<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

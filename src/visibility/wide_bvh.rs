@@ -10,10 +10,11 @@
 //! 2008). Both tests are in 32 bits and conservative: candidates go to the exact test.
 
 use arrayvec::ArrayVec;
-use glam::{DVec3, Vec4};
+use fearless_simd::{Simd, SimdBase};
+use glam::DVec3;
 
 use super::collapse::{Collapse, WIDTH};
-use super::ray32::{BoxPlanes, Ray32, splat};
+use super::ray32::{BoxPlanes, Lanes, Ray32, planes_from, splat};
 use super::sah_tree::{MAX_LEVELS, SahTree};
 use super::triangle_pack::TrianglePack;
 
@@ -76,14 +77,14 @@ impl WideBvh {
         corners: &impl Fn(u32) -> [DVec3; 3],
     ) -> Child {
         let number = self.nodes.len();
-        let nothing = [[[Vec4::INFINITY; 2]; 3], [[Vec4::NEG_INFINITY; 2]; 3]];
+        let nothing = [f32::INFINITY, f32::NEG_INFINITY].map(|side| [Lanes([side; WIDTH]); 3]);
         self.nodes.push(WideNode { planes: nothing, children: [Child::NOTHING; WIDTH] });
         for (k, child) in collapse.children(tree, root).into_iter().enumerate() {
             let node = &tree.nodes[child];
             for axis in 0..3 {
                 let planes = &mut self.nodes[number].planes;
-                planes[0][axis][k / 4][k % 4] = node.bounds.low[axis];
-                planes[1][axis][k / 4][k % 4] = node.bounds.high[axis];
+                planes[0][axis].0[k] = node.bounds.low[axis];
+                planes[1][axis].0[k] = node.bounds.high[axis];
             }
             self.nodes[number].children[k] = if node.children.is_some() {
                 self.add(tree, collapse, child, corners)
@@ -99,13 +100,14 @@ impl WideBvh {
     /// Calls `may_meet` with each triangle below `root` that `ray` may hit before its end, by their
     /// indices in the order of the tree, approximately front to back. It may return a new end.
     #[inline(always)]
-    pub fn trace(
+    pub fn trace<S: Simd>(
         &self,
+        simd: S,
         root: Child,
         ray: &mut Ray32,
         mut may_meet: impl FnMut(usize) -> Option<f32>,
     ) {
-        let origin = splat(ray.origin);
+        let origin = splat(simd, ray.origin);
         // At most all boxes of a node per level, except the one entered.
         let mut open: ArrayVec<OpenBox, { (WIDTH - 1) * MAX_LEVELS as usize + WIDTH }> =
             ArrayVec::new();
@@ -114,14 +116,13 @@ impl WideBvh {
             match child.kind() {
                 ChildKind::Node(node) => {
                     let node = &self.nodes[node];
-                    let seen = |side: usize, axis: usize, half: usize| {
-                        node.planes[side][axis][half] - origin[axis]
-                    };
-                    let (mut hits, entries) = ray.meets(seen);
+                    let planes = planes_from(simd, &node.planes, &origin);
+                    let (mut hits, entries) = ray.meets(simd, &planes);
+                    let entries = entries.to_array();
                     let mut next = || {
                         let k = hits.trailing_zeros() as usize;
                         hits &= hits.wrapping_sub(1);
-                        let entry = entries.as_flattened().get(k)?;
+                        let entry = entries.get(k)?;
                         Some(OpenBox::new(*entry, node.children[k]))
                     };
                     if let Some(mut nearest) = next() {
@@ -135,7 +136,7 @@ impl WideBvh {
                 }
                 ChildKind::Pack(pack) => {
                     let pack = &self.packs[pack];
-                    pack.seen_from(ray.origin).trace(pack.first, ray, &mut may_meet);
+                    pack.seen_from(simd, ray.origin).trace(simd, pack.first, ray, &mut may_meet);
                 }
             }
             // Boxes that begin beyond the end of the ray are skipped.
