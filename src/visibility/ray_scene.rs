@@ -26,8 +26,8 @@ use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 use super::cut_outs::CutOuts;
-use super::ray_stream::MAX_STREAM;
-use super::ray32::{LocalUnit, rounded_up};
+use super::ray_stream::{MAX_STREAM, OpenChildren};
+use super::ray32::{LocalUnit, Ray32, rounded_up};
 use super::sah_tree::{Aabb32, SahTree};
 use super::triangle_plane::TrianglePlane;
 use super::wide_bvh::{Child, WideBvh};
@@ -47,6 +47,18 @@ pub(crate) struct RayScene {
     cut_outs: Option<CutOuts>,
     /// Vector instructions of this machine.
     level: Level,
+}
+
+/// Rays from one point and their nearest hits; used again and again, so that nothing is allocated.
+#[derive(Default)]
+struct Stream {
+    directions: ArrayVec<DVec3, MAX_STREAM>,
+    hits: ArrayVec<Option<Hit>, MAX_STREAM>,
+    /// In the hierarchy's unit.
+    rays: ArrayVec<Ray32, MAX_STREAM>,
+    /// Of the directions, in units of the rays' own.
+    lengths: ArrayVec<f64, MAX_STREAM>,
+    open: OpenChildren,
 }
 
 impl RayScene {
@@ -185,43 +197,49 @@ impl RayScene {
         mut visit: impl FnMut(DVec3, Option<Hit>),
     ) {
         let mut directions = directions.peekable();
+        let mut stream = Stream::default();
         while directions.peek().is_some() {
-            let stream: ArrayVec<DVec3, MAX_STREAM> =
-                directions.by_ref().take(MAX_STREAM).collect();
-            let hits = dispatch!(self.level, simd => {
-                self.nearest_of_stream(simd, from, &stream, start, ignored)
+            stream.directions = directions.by_ref().take(MAX_STREAM).collect();
+            dispatch!(self.level, simd => {
+                self.trace_stream(simd, from, &mut stream, start, ignored)
             });
-            stream.into_iter().zip(hits).for_each(|(direction, hit)| visit(direction, hit));
+            let Stream { directions, hits, .. } = &stream;
+            directions.iter().zip(hits).for_each(|(&direction, &hit)| visit(direction, hit));
         }
     }
 
+    /// Finds the nearest hits of a `stream` from one point.
     #[inline(always)]
-    fn nearest_of_stream<S: Simd>(
+    fn trace_stream<S: Simd>(
         &self,
         simd: S,
         from: DVec3,
-        directions: &[DVec3],
+        stream: &mut Stream,
         start: f64,
         ignored: Option<usize>,
-    ) -> ArrayVec<Option<Hit>, MAX_STREAM> {
-        let mut best: ArrayVec<Option<Hit>, MAX_STREAM> = directions.iter().map(|_| None).collect();
-        let local = |&d: &DVec3| self.unit.ray(from, d, start..f64::INFINITY);
-        let (mut rays, lengths): (Vec<_>, Vec<f64>) = directions.iter().map(local).unzip();
+    ) {
+        let Stream { directions, hits, rays, lengths, open } = stream;
+        (hits.clear(), rays.clear(), lengths.clear());
+        for &direction in &*directions {
+            let (ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
+            hits.push(None);
+            rays.push(ray);
+            lengths.push(length);
+        }
         self.bvh.trace_stream(
             simd,
-            &mut rays,
+            (rays, open),
             #[inline(always)]
             |ray, k| {
                 let plane = &self.triangles[k];
-                let hit = plane.nearer((from, directions[ray]), start, ignored, best[ray])?;
+                let hit = plane.nearer((from, directions[ray]), start, ignored, hits[ray])?;
                 if !self.is_solid(&hit) {
                     return None;
                 }
-                best[ray] = Some(hit);
+                hits[ray] = Some(hit);
                 Some(rounded_up(hit.distance * lengths[ray]))
             },
         );
-        best
     }
 
     /// Whether any hit for which `counts` is true lies along `direction` (any length) from `from`,

@@ -35,13 +35,12 @@ impl WideBvh {
     pub fn trace_stream<S: Simd>(
         &self,
         simd: S,
-        rays: &mut [Ray32],
+        (rays, open): (&mut [Ray32], &mut OpenChildren),
         mut may_meet: impl FnMut(usize, usize) -> Option<f32>,
     ) {
         let Some(&Ray32 { origin, .. }) = rays.first() else { return };
         let origins = splat(simd, origin);
-        let mut open = OpenChildren { waiting: (0..rays.len() as u8).collect(), begins: vec![] };
-        open.begins.push((Child::ROOT, 0));
+        open.begin_with(rays.len());
         while let Some((child, active)) = open.pop() {
             if let &[ray] = active.as_slice() {
                 let ray = usize::from(ray);
@@ -82,7 +81,8 @@ impl WideBvh {
 }
 
 /// Children to be entered, the next at the end.
-struct OpenChildren {
+#[derive(Default)]
+pub(super) struct OpenChildren {
     /// Rays that reach each child, one list after the other.
     waiting: Vec<u8>,
     /// Each with the beginning of its list.
@@ -90,6 +90,14 @@ struct OpenChildren {
 }
 
 impl OpenChildren {
+    /// The root alone, which this number of `rays` reach.
+    fn begin_with(&mut self, rays: usize) {
+        self.waiting.clear();
+        self.waiting.extend(0..rays as u8);
+        self.begins.clear();
+        self.begins.push((Child::ROOT, 0));
+    }
+
     /// The next child, and the rays that reach it.
     #[inline(always)]
     fn pop(&mut self) -> Option<(Child, Rays)> {
