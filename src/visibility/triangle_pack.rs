@@ -17,7 +17,7 @@
 //! total within 64 h r e. t D is off by 14 h r e², and by D's error times t, which no hit in the
 //! scene has above 2 r: within twice 64 h r e².
 
-use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x4};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x4};
 use glam::{DVec3, Vec3A};
 
 use super::ray32::{Ray32, SCENE_SIZE, splat};
@@ -122,18 +122,19 @@ impl<S: Simd> PackSeen<S> {
         let (rise, steep) = (front.select(self.rise, -self.rise), front.select(facing, -facing));
         let [margin, rise_margin] = self.margins;
         let inside = u.min(v).simd_ge(-margin) & (u + v).simd_le(steep + margin + margin);
-        let within = rise.simd_ge(steep * ray.start - rise_margin)
-            & rise.simd_le(steep * ray.end + rise_margin);
+        let within = rise.simd_ge(steep.mul_sub(f32x4::splat(simd, ray.start), rise_margin))
+            & rise.simd_le(steep.mul_add(f32x4::splat(simd, ray.end), rise_margin));
         (inside & within).to_bitmask() as u32
     }
 }
 
 #[inline(always)]
 fn cross<S: Simd>(a: &[f32x4<S>; 3], b: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    let component = |i: usize, j: usize| a[i].mul_sub(b[j], a[j] * b[i]);
+    [component(1, 2), component(2, 0), component(0, 1)]
 }
 
 #[inline(always)]
 fn dot<S: Simd>(a: &[f32x4<S>; 3], b: &[f32x4<S>; 3]) -> f32x4<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
