@@ -36,7 +36,6 @@ use super::sampled_mesh::{SampledMesh, after_split};
 use super::shadow_edges::resolve_shadow_edges;
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
-use super::vertex_weights::vertex_weights;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
 use crate::accuracy::tail::Ranking;
@@ -236,8 +235,8 @@ impl<'a> AdaptiveGather<'a> {
     }
 
     /// All passes: those before the last with coarser tolerances, since each vertex of the next
-    /// averages their errors over its hemisphere. Where vertices exchange all further bounces, these
-    /// are added to what the last pass gathered, and only new vertices gather after that.
+    /// averages their errors over its hemisphere. Where vertices exchange all further bounces,
+    /// these are added to what the last pass gathered, and only new vertices gather after that.
     pub fn run_passes(
         &mut self,
         settings: &RefinementSettings,
@@ -273,12 +272,11 @@ impl<'a> AdaptiveGather<'a> {
     /// Gathers the source at all vertices; nothing is split.
     pub fn gather_all(
         &mut self,
-        settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
         let before = self.samples.reflected.clone();
-        if self.gather(&self.all_vertices(), settings, gatherer, progress)?.is_break() {
+        if self.gather(&self.all_vertices(), gatherer, progress)?.is_break() {
             return Ok(StopReason::Cancelled);
         }
         self.has_gathered_all = true;
@@ -294,7 +292,7 @@ impl<'a> AdaptiveGather<'a> {
         probes: Option<&mut (dyn Gather + '_)>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
-        if self.gather_all(settings, gatherer, progress)? == StopReason::Cancelled {
+        if self.gather_all(gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
         self.refine(settings, gatherer, probes, progress)
@@ -368,7 +366,7 @@ impl<'a> AdaptiveGather<'a> {
             self.probes.split(&marked);
             known = after_split(&known, &marked, None);
             self.refinements += 1;
-            if self.gather(&new_vertices, settings, gatherer, progress)?.is_break() {
+            if self.gather(&new_vertices, gatherer, progress)?.is_break() {
                 return Ok(StopReason::Cancelled);
             }
         }
@@ -473,11 +471,9 @@ impl<'a> AdaptiveGather<'a> {
     fn gather(
         &mut self,
         vertices: &[u32],
-        settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<ControlFlow<()>, Error> {
-        let weights = vertex_weights(&self.samples, &self.scale, settings);
         let SampledMesh {
             mesh,
             vertices: mesh_vertices,
@@ -502,8 +498,7 @@ impl<'a> AdaptiveGather<'a> {
             let mut queue = &pending[..];
             while !queue.is_empty() {
                 let batch = batch_sizer.next(&mut queue, |vertices| {
-                    let point = |&v: &u32| points.point(v, attempt).weighing(weights[v as usize]);
-                    let points = vertices.par_iter().map(point).collect();
+                    let points = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
                     gather_batch(vertices, points, &source, gatherer)
                 })?;
                 let unresolved = batch.unresolved(&points, attempt);
@@ -636,8 +631,7 @@ mod tests {
         let settings = RefinementSettings::new(1e9);
         let proceed = &mut |_: &Progress| ControlFlow::Continue(());
         let mut once = state.clone();
-        once.gather_all(&settings, &mut RayGather::new(&once.samples.mesh, 16).unwrap(), proceed)
-            .unwrap();
+        once.gather_all(&mut RayGather::new(&once.samples.mesh, 16).unwrap(), proceed).unwrap();
         state.run_passes(&settings, gatherers, proceed).unwrap();
         // And has a row; a few points of the first are tried again in other elements.
         let counts = [state.gather_count, once.gather_count];
@@ -666,7 +660,7 @@ mod tests {
         for _ in 0..30 {
             by_passes.promote_to_source();
             let all = by_passes.all_vertices();
-            let _ = by_passes.gather(&all, &settings, &mut rays, &mut proceed).unwrap();
+            let _ = by_passes.gather(&all, &mut rays, &mut proceed).unwrap();
         }
         let (mut off, mut added, mut total) = (0.0, 0.0, 0.0);
         for (v, first) in first.iter().enumerate() {

@@ -34,12 +34,6 @@ pub(super) const CHILD_SURPLUS: f64 = 0.25;
 /// jump of the light. No other value was tried.
 const MAX_CERTAIN_SURPLUS: f64 = 0.3;
 
-/// Standard errors up to which a difference is taken for noise: of normal errors one in 400 is
-/// larger, and rays know theirs roughly. With 1, noise alone leaves half of its variance, and a
-/// city of 18 454 triangles was split into 13 % more elements by 128 rays, into four times as many
-/// by a quarter of them.
-const NOISES: f64 = 3.0;
-
 /// A value at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeValue {
@@ -201,10 +195,10 @@ impl HierarchicalSurplus {
 }
 
 /// What is left of a difference of this `length` where its standard error is `noise`: the mean of
-/// its square is that of what it is without noise, plus that of the noise, of which no more than
-/// [`NOISES`] pass. Elements that are split for noise get corners that are as noisy.
+/// its square is that of what it is without noise, plus that of the noise. Elements that are split
+/// for noise get corners that are as noisy.
 pub(super) fn beyond_noise(length: f64, noise: f64) -> f64 {
-    (length.powi(2) - (NOISES * noise).powi(2)).max(0.0).sqrt()
+    (length.powi(2) - noise.powi(2)).max(0.0).sqrt()
 }
 
 /// Values at the vertices of which the linear interpolant has, over every element, about the mean

@@ -201,7 +201,7 @@ impl RayScene {
         while directions.peek().is_some() {
             stream.directions = directions.by_ref().take(MAX_STREAM).collect();
             dispatch!(self.level, simd => {
-                self.trace_stream(simd, from, &mut stream, start, ignored)
+                self.trace_stream(simd, from, &mut stream, start, ignored);
             });
             let Stream { directions, hits, .. } = &stream;
             directions.iter().zip(hits).for_each(|(&direction, &hit)| visit(direction, hit));
@@ -219,7 +219,9 @@ impl RayScene {
         ignored: Option<usize>,
     ) {
         let Stream { directions, hits, rays, lengths, open } = stream;
-        (hits.clear(), rays.clear(), lengths.clear());
+        hits.clear();
+        rays.clear();
+        lengths.clear();
         for &direction in &*directions {
             let (ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
             hits.push(None);
@@ -346,8 +348,8 @@ mod tests {
         let mut levels = vec![best, Level::baseline()];
         #[cfg(target_arch = "x86_64")]
         {
-            levels.extend(best.as_sse4_2().map(|level| level.level()));
-            levels.extend(best.as_avx2().map(|level| level.level()));
+            levels.extend(best.as_sse4_2().map(Simd::level));
+            levels.extend(best.as_avx2().map(Simd::level));
         }
         levels
     }
