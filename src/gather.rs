@@ -37,6 +37,7 @@ mod source_light;
 mod surplus;
 pub(crate) mod two_sided;
 pub(crate) mod vertex_rows;
+pub(crate) mod vertex_weights;
 pub(crate) mod visible;
 
 use glam::DVec3;
@@ -132,6 +133,20 @@ pub trait Gather {
         points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error>;
 
+    /// The same, where the squared errors of points count with `weights`: the number of samples of
+    /// this gatherer is that of a weight of 1. Worth implementing where samples take time.
+    ///
+    /// # Errors
+    /// Those of [`Gather::gather`].
+    fn gather_weighted(
+        &mut self,
+        field: &RadiosityField,
+        points: &[GatherPoint],
+        _weights: &[f64],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        self.gather(field, points)
+    }
+
     /// What arrives at each of `points` from two fields of one scene, field by field, with the same
     /// directions. Worth implementing where finding what is seen costs more than looking its light
     /// up.
@@ -161,6 +176,15 @@ impl<G: Gather + ?Sized> Gather for Box<G> {
         points: &[GatherPoint],
     ) -> Result<Vec<IrradianceSample>, Error> {
         (**self).gather(field, points)
+    }
+
+    fn gather_weighted(
+        &mut self,
+        field: &RadiosityField,
+        points: &[GatherPoint],
+        weights: &[f64],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        (**self).gather_weighted(field, points, weights)
     }
 
     fn gather_both(

@@ -95,6 +95,18 @@ impl<A: Gather, B: Gather> Gather for Fallback<'_, A, B> {
         self.request(|first| first.gather(field, points), |second| second.gather(field, points))
     }
 
+    fn gather_weighted(
+        &mut self,
+        field: &RadiosityField,
+        points: &[GatherPoint],
+        weights: &[f64],
+    ) -> Result<Vec<IrradianceSample>, Error> {
+        self.request(
+            |first| first.gather_weighted(field, points, weights),
+            |second| second.gather_weighted(field, points, weights),
+        )
+    }
+
     fn gather_both(
         &mut self,
         fields: [&RadiosityField; 2],

@@ -275,7 +275,8 @@ impl<'a> GatherPhase<'a> {
         let mut gatherer =
             self.backend.gather_evenly(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
         let rows = RayGather::new(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
-        if self.state.gather_all(&mut *gatherer, progress)? == StopReason::Cancelled {
+        let settings = self.gather.refinement.clone();
+        if self.state.gather_all(&settings, &mut *gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
         let stop = self.state.add_further_bounces(&rows, progress);

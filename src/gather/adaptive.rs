@@ -36,6 +36,7 @@ use super::sampled_mesh::{SampledMesh, after_split};
 use super::shadow_edges::resolve_shadow_edges;
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
+use super::vertex_weights::vertex_weights;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
 use crate::accuracy::tail::Ranking;
@@ -272,9 +273,13 @@ impl<'a> AdaptiveGather<'a> {
     /// Gathers the source at all vertices; nothing is split.
     pub fn gather_all(
         &mut self,
+        settings: &RefinementSettings,
         gatherer: &mut dyn Gather,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
+        if !self.has_gathered_all {
+            self.samples.weights = vertex_weights(&self.samples, &self.scale, settings);
+        }
         let before = self.samples.reflected.clone();
         if self.gather(&self.all_vertices(), gatherer, progress)?.is_break() {
             return Ok(StopReason::Cancelled);
@@ -292,7 +297,7 @@ impl<'a> AdaptiveGather<'a> {
         probes: Option<&mut (dyn Gather + '_)>,
         progress: &mut ProgressCallback,
     ) -> Result<StopReason, Error> {
-        if self.gather_all(gatherer, progress)? == StopReason::Cancelled {
+        if self.gather_all(settings, gatherer, progress)? == StopReason::Cancelled {
             return Ok(StopReason::Cancelled);
         }
         self.refine(settings, gatherer, probes, progress)
@@ -479,6 +484,7 @@ impl<'a> AdaptiveGather<'a> {
             vertices: mesh_vertices,
             reflected,
             noise,
+            weights,
             buried,
             hidden,
             direct,
@@ -498,7 +504,8 @@ impl<'a> AdaptiveGather<'a> {
             let mut queue = &pending[..];
             while !queue.is_empty() {
                 let batch = batch_sizer.next(&mut queue, |vertices| {
-                    let points = vertices.par_iter().map(|&v| points.point(v, attempt)).collect();
+                    let point = |&v: &u32| points.point(v, attempt).weighing(weights[v as usize]);
+                    let points = vertices.par_iter().map(point).collect();
                     gather_batch(vertices, points, &source, gatherer)
                 })?;
                 let unresolved = batch.unresolved(&points, attempt);
@@ -631,7 +638,8 @@ mod tests {
         let settings = RefinementSettings::new(1e9);
         let proceed = &mut |_: &Progress| ControlFlow::Continue(());
         let mut once = state.clone();
-        once.gather_all(&mut RayGather::new(&once.samples.mesh, 16).unwrap(), proceed).unwrap();
+        once.gather_all(&settings, &mut RayGather::new(&once.samples.mesh, 16).unwrap(), proceed)
+            .unwrap();
         state.run_passes(&settings, gatherers, proceed).unwrap();
         // And has a row; a few points of the first are tried again in other elements.
         let counts = [state.gather_count, once.gather_count];

@@ -8,15 +8,11 @@
 use super::gather_points::{SurfaceOffset, is_buried};
 use super::refinement_indicator::ErrorScale;
 use super::sampled_mesh::{SampledMesh, after_split};
-use super::surplus::beyond_noise;
+use super::surplus::{CERTAIN_ERRORS, beyond_noise};
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
-
-/// Standard errors up to which a difference is taken for noise: of normal errors one in 400 is
-/// larger, and rays know theirs roughly.
-const NOISES: f64 = 3.0;
 
 /// Relative errors of elements, root mean square, by their centroids.
 #[derive(Clone)]
@@ -74,7 +70,7 @@ impl CentroidProbes {
             let of_corners = samples.corners()[e].map(|v| samples.noise[v as usize].powi(2));
             let own = material.albedo().max_element() * sample.noise;
             let noise = (own * own + of_corners.iter().sum::<f64>() / 9.0).sqrt();
-            let difference = beyond_noise((probed - expected).length(), NOISES * noise);
+            let difference = beyond_noise((probed - expected).length(), CERTAIN_ERRORS * noise);
             let is_known = !is_buried(sample, scale.touching()) && darker > 0.0;
             // Of a bump of unknown shape over the whole element, half is the root mean square.
             self.errors[e] = if is_known { (0.5 * difference / darker) as f32 } else { 0.0 };

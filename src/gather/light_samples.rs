@@ -84,6 +84,8 @@ pub(crate) struct LightRay<'a, L> {
 /// Sums over rays of a stratum.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
+    /// Number of rays.
+    rays: f64,
     /// Of the rays that arrive; times the transmittance of panes.
     seen: Rgb,
     /// Of all rays, summed over the channels.
@@ -203,6 +205,7 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
     ) -> LightSums {
         let mut sums = vec![Seen::default(); self.strata.len() + 1];
         self.visit(range, chosen, |LightRay { stratum, sample, weight, .. }| {
+            sums[stratum].rays += 1.0;
             sums[stratum].all += weight.element_sum();
             sums[stratum].seen += weight * passed(&sample);
         });
@@ -213,7 +216,7 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
     /// their light as the others.
     pub fn irradiance(&self, sums: &LightSums) -> Rgb {
         let (mut arriving, mut cast, mut missing) = (Rgb::ZERO, 0.0, 0.0);
-        for (irradiance, Seen { seen, all }) in self.irradiance_of_strata().zip(&sums.0) {
+        for (irradiance, Seen { seen, all, .. }) in self.irradiance_of_strata().zip(&sums.0) {
             let brightness = irradiance.element_sum();
             if *all == 0.0 {
                 missing += brightness;
@@ -229,6 +232,14 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
         }
     }
 
+    /// The largest irradiance of one ray of a stratum where some rays arrive and some do not,
+    /// W/m²: a length over the channels.
+    pub fn of_one_ray(&self, sums: &LightSums) -> f64 {
+        let strata = self.irradiance_of_strata().zip(&sums.0).enumerate();
+        let partial = strata.filter(|(k, _)| sums.is_partial(*k));
+        partial.map(|(_, (irradiance, seen))| irradiance.length() / seen.rays).fold(0.0, f64::max)
+    }
+
     /// Irradiance of each stratum and of the pool, if nothing is in the way, W/m² per channel.
     pub fn irradiance_of_strata(&self) -> impl Iterator<Item = Rgb> {
         let own = self.strata.iter().map(|stratum| stratum.node.irradiance);
@@ -240,6 +251,7 @@ impl LightSums {
     /// Adds the sums over other rays of the same lights.
     pub fn add(&mut self, other: &LightSums) {
         for (sum, term) in self.0.iter_mut().zip(&other.0) {
+            sum.rays += term.rays;
             sum.seen += term.seen;
             sum.all += term.all;
         }
@@ -247,7 +259,7 @@ impl LightSums {
 
     /// Whether some rays of a stratum arrive, and some do not.
     pub fn is_partial(&self, stratum: usize) -> bool {
-        let Seen { seen, all } = self.0[stratum];
+        let Seen { seen, all, .. } = self.0[stratum];
         seen != Rgb::ZERO && seen.element_sum() < (1.0 - 1e-12) * all
     }
 }

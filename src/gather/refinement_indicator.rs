@@ -8,9 +8,9 @@
 //!
 //! | element | e |
 //! |---|---|
-//! | a parent of smooth light, of surplus s | s/8: a child's own is s/4, and e is half of that |
+//! | a parent of smooth light | that of the quadratic interpolant from the linear one |
 //! | a parent with a jump | 0.2 of the largest difference of corners |
-//! | no parent | 1/8 of that, or how far the light before is from linear |
+//! | no parent | 1/8 of that difference, or how far the light before is from linear |
 //!
 //! Differences count as far as they are more than the noise of what they are between.
 //! Elements far from the region of the light count as if they were smaller, by the factor that
@@ -23,7 +23,7 @@ use glam::DVec2;
 use super::RadiosityField;
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
-use super::surplus::{CHILD_SURPLUS, HierarchicalSurplus, MidsideSurplus, NodeValue, beyond_noise};
+use super::surplus::{HierarchicalSurplus, NodeValue, beyond_noise};
 use crate::accuracy::{Measure, hidden};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
@@ -36,18 +36,15 @@ const SOURCE_SAMPLES: u32 = 4;
 /// Points of that lattice.
 const LATTICE_POINTS: usize = ((SOURCE_SAMPLES + 1) * (SOURCE_SAMPLES + 2) / 2) as usize;
 
-/// Root mean square of a quadratic's distance from its linear interpolant over the largest surplus
-/// of its midsides: 0.42 for 4 λ_i λ_j alone (one curved side), 0.71 for two equal surpluses.
-const RMS_OVER_SURPLUS: f64 = 0.5;
-
 /// Where the light jumps by 1 across an element, from one corner to the two others, the linear
 /// interpolant is off by this, root mean square over the dark side: a quarter of the element and
 /// the half that is left were off by 0.25 and 0.24 for jumps half-way.
 pub(crate) const RMS_OVER_JUMP: f64 = 0.2;
 
-/// Surplus of a side between whose ends nothing was gathered, over their difference: half of the
-/// maximum of a monotone function.
-const END_DIFFERENCE_SHARE: f64 = 0.25;
+/// Root mean square error of an element over the largest difference of its corners, where nothing
+/// was gathered between them: a surplus of a quarter of that, half of the maximum of a monotone
+/// function, and half of the surplus over the element (0.42 for one curved side, 0.73 for two).
+const RMS_OVER_DIFFERENCE: f64 = 0.125;
 
 /// Squared error of an element that has to be split because its vertices do not predict it.
 pub(super) const UNKNOWN: f64 = f64::INFINITY;
@@ -183,7 +180,6 @@ fn predicted_rms(
         return None;
     }
     let relative = RelativeError::new(&corners, mesh.material(mesh.element(e)).exitance, floor);
-    let of_ends = RMS_OVER_SURPLUS * END_DIFFERENCE_SHARE;
     let Some(parent) = HierarchicalSurplus::of_parent(samples, e) else {
         if !is_small {
             return None;
@@ -192,20 +188,18 @@ fn predicted_rms(
         // A vector over the channels as long as the root mean square.
         let rms = Rgb::splat(source_nonlinearity(mesh, source, e) / 3f64.sqrt());
         let gathered = sides.into_iter().filter(|[a, b]| !(a.buried && b.buried));
-        let ends = of_ends * relative.largest(gathered);
+        let ends = RMS_OVER_DIFFERENCE * relative.largest(gathered);
         return Some(ends.max(relative.error(mean, mean + rms, 0.0)));
     };
     let own = if parent.may_jump(floor) {
         let gathered = sides.into_iter().filter(|[a, b]| !a.buried && !b.buried);
         RMS_OVER_JUMP * relative.largest(gathered)
     } else {
-        let of_midside = |m: MidsideSurplus| relative.error(m.value, m.value - m.surplus, m.noise);
-        let largest = parent.sampled_midsides().map(of_midside).fold(0.0, f64::max);
-        RMS_OVER_SURPLUS * CHILD_SURPLUS * largest
+        relative.share(parent.child_rms())
     };
     // A buried corner has an extrapolated value, which should be about that of its element.
     let extrapolated = sides.into_iter().filter(|[a, b]| a.buried != b.buried);
-    Some(own.max(of_ends * relative.largest(extrapolated)))
+    Some(own.max(RMS_OVER_DIFFERENCE * relative.largest(extrapolated)))
 }
 
 /// Differences of reflected radiosity in an element, relative to its radiosity.
@@ -231,6 +225,12 @@ impl RelativeError {
         let radiosity = (value + self.emitted).length().min(self.darkest).max(self.floor);
         let difference = beyond_noise((value - other).length(), noise);
         if radiosity > 0.0 { difference / radiosity } else { 0.0 }
+    }
+
+    /// `rms`, W/m², relative to the darkest corner.
+    fn share(&self, rms: f64) -> f64 {
+        let radiosity = self.darkest.max(self.floor);
+        if radiosity > 0.0 { rms / radiosity } else { 0.0 }
     }
 
     /// The largest between the ends of `sides`; 0 without any.
@@ -371,11 +371,12 @@ mod tests {
             *value = Rgb::splat(if position.distance(middle) < 1e-9 { 1.1 } else { 1.0 });
         }
         samples.noise.fill(0.0);
-        // The surplus s of a parent is 0.1 of the darkest corner: e = s/8, over an area of 512.
+        // The surplus s of a parent is 0.1 of the darkest corner, that of a child s/4, over an area
+        // of 512: e is s/4 times the root mean square of 4 λ_i λ_j, √(8/45).
         let settings = RefinementSettings::new(1.0);
         for e in 0..8 {
             let square = squared_error(&samples, &field, &scale, &settings, e, 0.0);
-            let expected = 512.0 * (0.1_f64 / 8.0).powi(2);
+            let expected = 512.0 * (0.1_f64 / 4.0).powi(2) * 8.0 / 45.0;
             assert!((square / expected - 1.0).abs() < 1e-12, "{e}: {square}, not {expected}");
         }
     }

@@ -28,6 +28,9 @@ pub(crate) struct SampledMesh {
     pub reflected: Vec<Rgb>,
     /// Standard error of `reflected` by the rays of each vertex, W/m²: a length over the channels.
     pub noise: Vec<f64>,
+    /// What the squared error of a vertex counts in that of the whole, by the area around it before
+    /// elements were split; see [`vertex_weights`](super::vertex_weights).
+    pub weights: Vec<f64>,
     /// Whether a vertex is buried: all its gather points lie inside something that touches its
     /// surface. Its value is extrapolated from its neighbours.
     pub buried: Vec<bool>,
@@ -46,13 +49,14 @@ impl SampledMesh {
         let value = |&(t, [u, v]): &(usize, [f64; 2])| field.untextured_at(t, u, v);
         let reflected: Vec<Rgb> = places.par_iter().map(value).collect();
         let noise = vec![0.0; reflected.len()];
+        let weights = vec![1.0; reflected.len()];
         let buried = vec![false; reflected.len()];
         let hidden = buried.clone();
         let direct = match mesh.scene().has_directional_light() {
             true => vec![Direct::default(); reflected.len()],
             false => vec![],
         };
-        SampledMesh { mesh, topology, vertices, reflected, noise, buried, direct, hidden }
+        SampledMesh { mesh, topology, vertices, reflected, noise, weights, buried, direct, hidden }
     }
 
     /// The vertices at the corners of each element, by element.
@@ -91,15 +95,18 @@ impl SampledMesh {
         let mesh = self.mesh.split(elements)?;
         let (vertices, old_numbers) = self.vertices.split(&mesh, &self.topology, elements);
         let mut reflected = kept(&self.reflected, &old_numbers);
+        let mut weights = kept(&self.weights, &old_numbers);
         for (k, &e) in elements.iter().enumerate() {
             // Each split before this one has put four elements in the place of one.
             let first_child = e + 3 * k;
-            let [a, b, c] = self.vertices.corners[e].map(|v| self.reflected[v as usize]);
-            // The corners of the fourth child are the middles of the sides opposite a, b and c.
+            let corners = self.vertices.corners[e].map(|v| v as usize);
+            // The corners of the fourth child are the middles of the sides opposite its number.
             let midsides = vertices.corners[first_child + 3].map(|v| v as usize);
-            for (m, sum_of_ends) in midsides.into_iter().zip([b + c, c + a, a + b]) {
+            for (k, m) in midsides.into_iter().enumerate() {
                 if old_numbers[m].is_none() {
-                    reflected[m] = sum_of_ends / 2.0;
+                    let [a, b] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+                    reflected[m] = (self.reflected[a] + self.reflected[b]) / 2.0;
+                    weights[m] = (self.weights[a] + self.weights[b]) / 2.0;
                 }
             }
         }
@@ -109,6 +116,7 @@ impl SampledMesh {
             vertices,
             reflected,
             noise: kept(&self.noise, &old_numbers),
+            weights,
             buried: kept(&self.buried, &old_numbers),
             direct: match self.direct.is_empty() {
                 true => vec![],

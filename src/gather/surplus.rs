@@ -14,13 +14,15 @@
 //!       a───m0──b
 //! ```
 //!
-//! Two numbers follow, both exact where the light is quadratic:
+//! Three numbers follow, all exact where the light is quadratic:
 //!
 //! - *Surplus of the children: ¼.* Along a side of length h, s = −f″ h²/8 with f″ constant. Each
 //!   side of a child is parallel to one of the parent and half as long, so its surplus is s/4.
 //! - *Mean over a child: Σ s_k / 12 above the linear one.* The mean of λ_i λ_j over a triangle is
 //!   1/12, so that of 4 λ_i λ_j is 1/3: over the parent the interpolant's mean is Σ s_k / 3 above
 //!   the linear one. A child has a quarter of each surplus.
+//! - *Mean square distance from the linear one: 4/45 (Σ |s_k|² + |Σ s_k|²).* The mean of
+//!   (4 λ_i λ_j)² is 8/45, that of the product of two of these 4/45.
 
 use rayon::prelude::*;
 
@@ -34,6 +36,13 @@ pub(super) const CHILD_SURPLUS: f64 = 0.25;
 /// jump of the light. No other value was tried.
 const MAX_CERTAIN_SURPLUS: f64 = 0.3;
 
+/// Mean over a triangle of 16 λ_i² λ_j λ_k.
+const MEAN_BUBBLE_PRODUCT: f64 = 4.0 / 45.0;
+
+/// Standard errors beyond which a difference is none of noise: of normal errors one in 400 is
+/// larger, and rays know theirs roughly.
+pub(super) const CERTAIN_ERRORS: f64 = 3.0;
+
 /// A value at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeValue {
@@ -43,16 +52,6 @@ pub(super) struct NodeValue {
     pub noise: f64,
     /// Whether the vertex is buried, so that the value is no sample of the light.
     pub buried: bool,
-}
-
-/// A midside that has gathered light.
-pub(super) struct MidsideSurplus {
-    /// Its value, W/m² per channel.
-    pub value: Rgb,
-    /// Its value less the mean of its side's ends, W/m² per channel.
-    pub surplus: Rgb,
-    /// Standard error of the surplus, W/m²: a length over the channels.
-    pub noise: f64,
 }
 
 impl NodeValue {
@@ -102,15 +101,9 @@ impl HierarchicalSurplus {
         self.midsides[k].noise.hypot(ends)
     }
 
-    /// The midsides that are not buried.
-    pub fn sampled_midsides(&self) -> impl Iterator<Item = MidsideSurplus> {
-        let surplus = self.midside_surplus();
-        let found = [0, 1, 2].map(|k| MidsideSurplus {
-            value: self.midsides[k].value,
-            surplus: surplus[k],
-            noise: self.surplus_noise(k),
-        });
-        found.into_iter().zip(&self.midsides).filter(|(_, m)| !m.buried).map(|(found, _)| found)
+    /// The midsides that are not buried, by number.
+    fn sampled_midsides(&self) -> impl Iterator<Item = usize> {
+        (0..3).filter(|&k| !self.midsides[k].buried)
     }
 
     /// Whether all six nodes are samples of the light.
@@ -132,9 +125,27 @@ impl HierarchicalSurplus {
         let nodes = self.corners.iter().chain(&self.midsides).filter(|n| !n.buried);
         let darkest = nodes.map(|n| n.value.length()).fold(f64::INFINITY, f64::min).max(floor);
         let surplus = self.midside_surplus();
-        let certain = |k: usize| beyond_noise(surplus[k].length(), self.surplus_noise(k));
+        let noise = |k: usize| CERTAIN_ERRORS * self.surplus_noise(k);
+        let certain = |k: usize| beyond_noise(surplus[k].length(), noise(k));
         let largest = [0, 1, 2].map(certain).into_iter().fold(0.0, f64::max);
         largest > MAX_CERTAIN_SURPLUS * darkest
+    }
+
+    /// Root mean square over a child of how far the quadratic interpolant is from the linear one,
+    /// without what noise adds to its square on average, W/m²: a length over the channels. Sides
+    /// whose midside is buried count as straight.
+    pub fn child_rms(&self) -> f64 {
+        let surplus = self.midside_surplus();
+        let (mut sum, mut squares, mut noise) = (Rgb::ZERO, 0.0, 0.0);
+        for k in self.sampled_midsides() {
+            sum += surplus[k];
+            squares += surplus[k].length_squared();
+            // Of the square, and of that of the sum: each end counts a half in two sides.
+            noise += self.surplus_noise(k).powi(2);
+            noise += self.midsides[k].noise.powi(2) + self.corners[k].noise.powi(2);
+        }
+        let square = squares + sum.length_squared() - noise;
+        CHILD_SURPLUS * (MEAN_BUBBLE_PRODUCT * square.max(0.0)).sqrt()
     }
 
     /// Mean of the corners' values, W/m² per channel.
@@ -149,7 +160,8 @@ impl HierarchicalSurplus {
 
     /// The same from the midsides that are not buried: 0 where all are.
     pub fn predicted_sampled_child_surplus(&self) -> f64 {
-        self.sampled_midsides().map(|m| m.surplus.length()).fold(0.0, f64::max) * CHILD_SURPLUS
+        let surplus = self.midside_surplus();
+        self.sampled_midsides().map(|k| surplus[k].length()).fold(0.0, f64::max) * CHILD_SURPLUS
     }
 
     /// Mean of the quadratic interpolant over a child less that of the linear one through the

@@ -18,6 +18,8 @@ pub(crate) struct TwoSidedPoint {
     height: f64,
     /// τ / (ρ + τ) per channel, in [0, 1].
     behind: Rgb,
+    /// What its squared error counts.
+    weight: f64,
 }
 
 impl TwoSidedPoint {
@@ -32,7 +34,12 @@ impl TwoSidedPoint {
     /// `point`, on a surface whose other side does not count.
     pub fn one_sided(point: GatherPoint) -> TwoSidedPoint {
         let height = point.near / offset::NEAR_OF_LIFT;
-        TwoSidedPoint { point, height, behind: Rgb::ZERO }
+        TwoSidedPoint { point, height, behind: Rgb::ZERO, weight: 1.0 }
+    }
+
+    /// The same, whose squared error counts `weight`.
+    pub fn weighing(self, weight: f64) -> TwoSidedPoint {
+        TwoSidedPoint { weight, ..self }
     }
 
     /// A point beside, `inward`, by 0.5e-3 to 1.5e-3 of `size` (scene unit), that of the element:
@@ -77,7 +84,9 @@ pub(crate) fn gather_two_sided(
     field: &RadiosityField,
     points: &[TwoSidedPoint],
 ) -> Result<Vec<IrradianceSample>, Error> {
-    let [samples] = with_both_sides(points, |points| Ok([gatherer.gather(field, points)?]))?;
+    let [samples] = with_both_sides(points, |points, weights| {
+        Ok([gatherer.gather_weighted(field, points, weights)?])
+    })?;
     Ok(samples)
 }
 
@@ -90,23 +99,28 @@ pub(crate) fn gather_both_two_sided(
     fields: [&RadiosityField; 2],
     points: &[TwoSidedPoint],
 ) -> Result<[Vec<IrradianceSample>; 2], Error> {
-    with_both_sides(points, |points| gatherer.gather_both(fields, points))
+    with_both_sides(points, |points, _| gatherer.gather_both(fields, points))
 }
+
+/// Samples of each of some fields.
+type ByField<const FIELDS: usize> = [Vec<IrradianceSample>; FIELDS];
 
 /// What `gather` finds at `points` from each of its fields, on both sides.
 fn with_both_sides<const FIELDS: usize>(
     points: &[TwoSidedPoint],
-    mut gather: impl FnMut(&[GatherPoint]) -> Result<[Vec<IrradianceSample>; FIELDS], Error>,
-) -> Result<[Vec<IrradianceSample>; FIELDS], Error> {
+    mut gather: impl FnMut(&[GatherPoint], &[f64]) -> Result<ByField<FIELDS>, Error>,
+) -> Result<ByField<FIELDS>, Error> {
     let fronts: Vec<GatherPoint> = points.iter().map(|p| p.point).collect();
-    let mut samples = gather(&fronts)?;
+    let weights: Vec<f64> = points.iter().map(|p| p.weight).collect();
+    let mut samples = gather(&fronts, &weights)?;
     let is_two_sided = |k: &usize| points[*k].behind != Rgb::ZERO;
     let two_sided: Vec<usize> = (0..points.len()).filter(is_two_sided).collect();
     if two_sided.is_empty() {
         return Ok(samples);
     }
     let backs: Vec<GatherPoint> = two_sided.iter().map(|&k| points[k].other_side()).collect();
-    for (samples, behind) in samples.iter_mut().zip(gather(&backs)?) {
+    let weights: Vec<f64> = two_sided.iter().map(|&k| weights[k]).collect();
+    for (samples, behind) in samples.iter_mut().zip(gather(&backs, &weights)?) {
         for (&k, &back) in two_sided.iter().zip(&behind) {
             samples[k] = mixed(samples[k], back, points[k].behind);
         }

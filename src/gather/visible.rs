@@ -29,6 +29,11 @@ impl Visible {
         }
     }
 
+    /// Whether some of it is visible, and some is not.
+    pub fn is_partial(&self) -> bool {
+        self.seen != Rgb::ZERO && self.seen.element_sum() < 3.0 * (1.0 - 1e-12) * self.all
+    }
+
     pub fn add(&mut self, other: &Visible) {
         self.points += other.points;
         self.seen += other.seen;

@@ -30,6 +30,33 @@ fn each_group_meets_its_error() {
     assert!(baked.groups.iter().all(|group| group.estimate.samples >= 16));
 }
 
+/// A shelf between a floor and a lamp as wide as that: at the edge of the full shadow a strip of
+/// the lamp is visible, and the noise of its light is no reason to split elements without end.
+#[test]
+fn edges_of_a_shadow_are_not_split_for_noise() {
+    let square = |z: f64, [low, high]: [f64; 2]| {
+        [[low, low, z], [high, low, z], [high, high, z], [low, high, z]]
+    };
+    let grey = Material::grey("grey", 0.6);
+    let lamp = Material { exitance: Rgb::splat(12.0), ..Material::grey("lamp", 0.0) };
+    let [a, b, c, d] = square(1.0, [0.0, 1.0]);
+    let faces = [
+        (square(0.0, [0.0, 1.0]), grey.clone()),
+        ([d, c, b, a], lamp),
+        (square(0.3, [0.3, 0.8]), grey),
+    ];
+    // Where the first rays happen to fall differs with the error.
+    for error in [0.019, 0.02, 0.021, 0.022] {
+        let baked =
+            BakeTarget::Error(error).bake(quads(&faces), &Backend::Cpu, keep_going).unwrap();
+        let elements = baked.light.mesh.element_count();
+        println!("{error}: {elements} elements, {}", baked.outcome);
+        assert_eq!(baked.outcome, Outcome::Reached, "{error}");
+        // 3 000 to 6 000 of 1 to 2 %; those of noise are bounded by 524 288 alone.
+        assert!(elements < 20_000, "{error}: {elements}");
+    }
+}
+
 /// 64 lamps below a ceiling of 6 m, in steps of 0.75 m: all vertices of coarse elements are alike,
 /// and the light between them is brighter.
 #[test]

@@ -175,8 +175,11 @@ impl RaySums for ShadowRays<'_> {
         self.light.lights.irradiance(&self.lights) + self.of_sun()
     }
 
-    /// 0: all rays to a light contribute to its occlusion.
-    fn largest(&self) -> f64 {
-        0.0
+    fn largest(&self, count: u32) -> f64 {
+        let sun = match self.sun.is_partial() {
+            true => self.light.sun.map_or(0.0, |sun| sun.irradiance.length()) / f64::from(count),
+            false => 0.0,
+        };
+        self.light.lights.of_one_ray(&self.lights).max(sun)
     }
 }

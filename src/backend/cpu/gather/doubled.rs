@@ -4,8 +4,10 @@
 //! error = max(|E_first − E_second|, c_max / n) / 2
 //! ```
 //!
-//! E_first and E_second are the irradiances of the two halves of the rays, and c_max the largest
-//! contribution of one ray: both halves may miss the same small source.
+//! E_first and E_second are the irradiances of the two halves of the rays, and c_max / n the
+//! largest contribution of one of n rays: both halves may miss the same small source, or see as
+//! many rays of the same strip of a lamp. (By quarters in place of halves errors are known better,
+//! but bakes of a hall and a castle took 12 % longer, for the same error.)
 
 use std::ops::Range;
 
@@ -19,8 +21,9 @@ pub(super) trait RaySums {
     /// The irradiance, if these are `count` rays.
     fn mean(&self, count: u32) -> Rgb;
 
-    /// The largest contribution of one ray.
-    fn largest(&self) -> f64;
+    /// The largest contribution of one ray that may as well be another one, if these are `count`
+    /// rays, W/m².
+    fn largest(&self, count: u32) -> f64;
 }
 
 /// Sums over rays, and the function that casts more.
@@ -57,7 +60,7 @@ impl<S: RaySums, T: Fn(Range<u32>) -> S> Doubled<S, T> {
         let difference = self.sums.mean(half).distance(second.mean(half));
         self.sums.add(&second);
         self.count = 2 * half;
-        self.error = difference.max(self.sums.largest() / f64::from(self.count)) / 2.0;
+        self.error = difference.max(self.sums.largest(self.count)) / 2.0;
     }
 
     /// The irradiance by all rays.

@@ -74,7 +74,8 @@ impl RayGather {
         let near_field = self.near_field.as_ref().filter(|_| direct.is_none());
         let (mut near, wide) = (vec![], direct.map_or(&[][..], DirectLight::wide));
         let mut of_wide: Vec<Visible> = wide.iter().map(|_| Visible::default()).collect();
-        self.cast(point, rotation, range.clone(), |ray, direction, hit| {
+        let samples = self.samples(self.min_rays);
+        self.cast((point, samples), rotation, range.clone(), |ray, direction, hit| {
             let passed = |end: f64| self.passed_evenly(point, direction, end);
             if let Some(direct) = direct {
                 direct.add_to_wide(&mut of_wide, direction, hit, passed);

@@ -77,6 +77,15 @@ impl<'a> WideLight<'a> {
         visible.seen * visible.share_of(Some(self.unoccluded))
     }
 
+    /// The irradiance of one ray where some arrive and some do not, W/m²: a length over the
+    /// channels.
+    pub fn of_one_ray(&self, visible: &Visible) -> f64 {
+        match visible.is_partial() {
+            true => self.patch.exitance.length() * visible.share_of(Some(self.unoccluded)),
+            false => 0.0,
+        }
+    }
+
     /// Its irradiance for this `visible` part.
     pub fn irradiance(&self, visible: &Visible) -> Rgb {
         self.patch.exitance * self.form_factor(visible)
