@@ -548,6 +548,12 @@ fn coarser(settings: &RefinementSettings, passes: u32) -> RefinementSettings {
     }
 }
 
+/// Elements of which one is split in a round, at least: a round goes over all, in about the time in
+/// which a thousandth to a hundredth of them gather. A hall of 128 000 triangles took 27 s with 150
+/// rounds, of which most split a few elements, 20.6 s with this, and 19.6 s with a quarter of it,
+/// which splits more.
+const ELEMENTS_PER_SPLIT: usize = 1024;
+
 /// The share of an element in the error of its mesh.
 #[derive(Clone, Copy)]
 struct Share {
@@ -559,9 +565,9 @@ struct Share {
 
 /// Those of the elements that are to be split for the mean square over all but the `tail`, a share
 /// of the area, to fall to what is `allowed`, with their shares in it; of many the worst, which
-/// make up most of it.
+/// make up most of it, and one of [`ELEMENTS_PER_SPLIT`] at least.
 fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usize)> {
-    let area: f64 = shares.iter().map(|share| share.area).sum();
+    let (elements, area) = (shares.len(), shares.iter().map(|share| share.area).sum::<f64>());
     // Of what is unknown, nothing says that it is in the tail.
     let error = |share: &Share| {
         let is_known = share.square.is_finite() && share.area > 0.0;
@@ -581,11 +587,13 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
     // Dörfler (1996): 80 % of the error is split at a time, since the next gather may change the
     // rest.
     let (mut excess, mut bulk) = (counted - allowed * (1.0 - tail) * area, 0.8 * total);
+    let mut least = if excess > 0.0 { elements / ELEMENTS_PER_SPLIT } else { 0 };
     let is_marked = move |share: &Share| {
         if share.square.is_finite() {
-            if excess <= 0.0 || bulk <= 0.0 {
+            if least == 0 && (excess <= 0.0 || bulk <= 0.0) {
                 return false;
             }
+            least = least.saturating_sub(1);
             // Of a jump, children keep the error over half of the area.
             excess -= 0.5 * share.square;
             bulk -= share.square;
@@ -600,6 +608,18 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
 mod tests {
     use super::*;
     use crate::backend::cpu::RayGather;
+
+    #[test]
+    fn a_round_splits_a_thousandth_of_the_elements() {
+        let share = |element: usize| Share { square: 1.0, area: 1.0, element };
+        let marked = |elements: usize, allowed: f64| {
+            bulk_above((0..elements).map(share).collect(), allowed, 0.0).len()
+        };
+        // All together are above what is allowed by half an element, or by as much as 100 keep.
+        let [few, many] = [0.5, 50.0].map(|excess| 1.0 - excess / 4096.0);
+        assert_eq!([marked(4096, few), marked(4096, many), marked(4096, 1.0)], [4, 100, 0]);
+        assert_eq!(marked(100, 1.0 - 0.5 / 100.0), 1);
+    }
 
     #[test]
     fn worst_elements_are_split_until_rest_is_allowed() {

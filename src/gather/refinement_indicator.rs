@@ -46,6 +46,10 @@ pub(crate) const RMS_OVER_JUMP: f64 = 0.2;
 /// function, and half of the surplus over the element (0.42 for one curved side, 0.73 for two).
 const RMS_OVER_DIFFERENCE: f64 = 0.125;
 
+/// Relative error up to which values differ by rounding alone. Where nothing counts, as on a sheet
+/// in the open, no error is allowed.
+const ROUNDING: f64 = 1e-9;
+
 /// Squared error of an element that has to be split because its vertices do not predict it.
 pub(super) const UNKNOWN: f64 = f64::INFINITY;
 
@@ -160,7 +164,10 @@ pub(super) fn squared_error(
     let is_small =
         relative_size(samples, scale, settings, e) <= 4.0 * settings.min_edge * group_factor;
     let rms = predicted_rms(samples, source, scale.radiosity_floor, e, is_small);
-    rms.map_or(UNKNOWN, |rms| weight * rms.max(probed).powi(2))
+    rms.map_or(UNKNOWN, |rms| match rms.max(probed) {
+        rms if rms > ROUNDING => weight * rms.powi(2),
+        _ => 0.0,
+    })
 }
 
 /// Relative error that element `e` is predicted to have, root mean square; none where its vertices

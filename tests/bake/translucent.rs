@@ -45,6 +45,9 @@ fn check(scene: &Scene, truth: [Rgb; 2], share: f64) {
     for backend in [Backend::Cpu, Backend::Gpu(gpu())] {
         let baked = BakeTarget::Error(0.02).bake(scene.clone(), &backend, keep_going).unwrap();
         assert!(baked.solution.ledger.imbalance() < 1e-9);
+        // The light is even: the first mesh does.
+        let elements = baked.light.mesh.element_count();
+        assert!(elements <= 2048, "{elements} elements");
         for (normal, truth) in [DVec3::Z, -DVec3::Z].into_iter().zip(truth) {
             let found = radiosity_of(&baked.light.surface, normal);
             assert!(!found.is_empty());
