@@ -66,10 +66,10 @@ pub struct RayGather {
 /// Powers of two up to [`hemisphere::MAX_RAYS`].
 const LEVELS: usize = hemisphere::MAX_RAYS.ilog2() as usize + 1;
 
-/// Smallest and largest number of rays of a point by its weight, as shares of that of a weight of
-/// 1. To 10 %, a hall of 128 000 triangles, a city, and a castle took 33, 41 and 31 s of processor
-/// time with a first share of 1/4, 1/8 or 1/16, and 39, 46 and 38 s without weights. The second is
-/// seldom reached.
+/// Smallest and largest number of rays of a point by its weight, as shares of that of the weight
+/// one. To 10 %, a hall of 128 000 triangles, a city, and a castle took 33, 41 and 31 s of
+/// processor time with a first share of 1/4, 1/8 or 1/16, and 39, 46 and 38 s without weights. The
+/// second is seldom reached.
 const RAYS_OF_WEIGHTS: [f64; 2] = [0.25, 4.0];
 
 /// The allowed noise in bounds of single lights: 64 errors of random signs are as large as it.
