@@ -103,7 +103,7 @@ impl DirectionalLight {
         let rays = |range| Visible::of_sun(sun, point, rotation, range, &self.rays, &self.panes);
         let [few, all] = RAYS_TO_SUN;
         let mut visible = rays(0..few);
-        if visible.seen != Rgb::ZERO && visible.seen != Rgb::splat(visible.all) {
+        if visible.is_partial() {
             visible.add(&rays(few..all));
         }
         visible.irradiance_of_sun(sun, point)

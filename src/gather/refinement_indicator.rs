@@ -117,6 +117,18 @@ pub(super) fn counted_area(
     mesh.solid_area(node) / (lengths * lengths)
 }
 
+/// What the squared relative error of element `e` counts: its area over the square of the error
+/// that its group may have, scene unit squared.
+pub(super) fn error_weight(
+    samples: &SampledMesh,
+    scale: &ErrorScale,
+    settings: &RefinementSettings,
+    e: usize,
+) -> f64 {
+    let factor = settings.group_factor(samples.mesh.group(samples.mesh.element(e)));
+    counted_area(samples, scale, settings, e) / (factor * factor)
+}
+
 /// Longest edge of element `e` over the scales of lengths where it is, scene unit.
 fn relative_size(
     samples: &SampledMesh,
@@ -159,7 +171,7 @@ pub(super) fn squared_error(
         return 0.0;
     }
     let group_factor = settings.group_factor(samples.mesh.group(samples.mesh.element(e)));
-    let weight = counted_area(samples, scale, settings, e) / (group_factor * group_factor);
+    let weight = error_weight(samples, scale, settings, e);
     // A beam of light may fall between the corners of larger elements.
     let is_small =
         relative_size(samples, scale, settings, e) <= 4.0 * settings.min_edge * group_factor;

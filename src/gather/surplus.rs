@@ -30,7 +30,7 @@ use super::sampled_mesh::SampledMesh;
 use crate::scene::Rgb;
 
 /// Surplus of a child's side over that of the parent's side it is parallel to, for quadratic light.
-pub(super) const CHILD_SURPLUS: f64 = 0.25;
+const CHILD_SURPLUS: f64 = 0.25;
 
 /// Surplus over the darkest of the six nodes, above which most of an element's error may be at a
 /// jump of the light. No other value was tried.

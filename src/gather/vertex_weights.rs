@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::refinement_indicator::{ErrorScale, counted_area};
+use super::refinement_indicator::{ErrorScale, error_weight};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 
@@ -25,13 +25,10 @@ pub(super) fn vertex_weights(
     scale: &ErrorScale,
     settings: &RefinementSettings,
 ) -> Vec<f64> {
-    let mesh = &samples.mesh;
     // A third of that of an element.
-    let of_element = |e: usize| {
-        let factor = settings.group_factor(mesh.group(mesh.element(e)));
-        counted_area(samples, scale, settings, e) / (3.0 * factor * factor)
-    };
-    let of_elements: Vec<f64> = (0..mesh.element_count()).into_par_iter().map(of_element).collect();
+    let of_element = |e: usize| error_weight(samples, scale, settings, e) / 3.0;
+    let elements = 0..samples.mesh.element_count();
+    let of_elements: Vec<f64> = elements.into_par_iter().map(of_element).collect();
     let mut weights = vec![0.0; samples.reflected.len()];
     for (corners, area) in samples.corners().iter().zip(of_elements) {
         for &v in corners {

@@ -67,9 +67,9 @@ pub struct RayGather {
 const LEVELS: usize = hemisphere::MAX_RAYS.ilog2() as usize + 1;
 
 /// Smallest and largest number of rays of a point by its weight, as shares of that of the weight
-/// one. To 10 %, a hall of 128 000 triangles, a city, and a castle took 33, 41 and 31 s of
-/// processor time with a first share of 1/4, 1/8 or 1/16, and 39, 46 and 38 s without weights. The
-/// second is seldom reached.
+/// one. To 10 %, a hall of 128 000 triangles, a city, and a castle took 39, 46 and 38 s of
+/// processor time without weights; 33, 41 and 31 s with a smallest share of 1/4; and 34 to 36, 38
+/// to 40 and 32 s with 1/8 or 1/16. The largest is seldom reached.
 const RAYS_OF_WEIGHTS: [f64; 2] = [0.25, 4.0];
 
 /// The allowed noise in bounds of single lights: 64 errors of random signs are as large as it.
@@ -164,7 +164,7 @@ impl RayGather {
         let [least, most] = RAYS_OF_WEIGHTS;
         let share = weight.powf(RAYS_BY_WEIGHT).clamp(least, most);
         let rays = f64::from(self.min_rays) * share;
-        (1 << rays.log2().round().max(1.0) as u32).min(hemisphere::MAX_RAYS)
+        power_of_two(rays).min(hemisphere::MAX_RAYS)
     }
 
     /// Directions for at least `min_rays`, a power of two.
@@ -279,7 +279,12 @@ pub(crate) fn min_rays(count: u32) -> Result<u32, Error> {
         let remedy = format!("use 1 to {}", hemisphere::MAX_RAYS);
         return Err(Error::new(ErrorKind::Setting, place, "not usable", remedy));
     }
-    Ok(1 << f64::from(count).log2().round().max(1.0) as u32)
+    Ok(power_of_two(f64::from(count)))
+}
+
+/// The power of two nearest to `rays`, on a scale of powers; 2 at least.
+fn power_of_two(rays: f64) -> u32 {
+    1 << rays.log2().round().max(1.0) as u32
 }
 
 /// Maximum number of rays of a point with at least `min_rays`: 16 times as many for a finite
@@ -430,7 +435,12 @@ impl Gather for RayGather {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::form_factor::closed_form::point_to_polygon;
+    use crate::gather::GatheredMesh;
+    use crate::scene::{Material, Triangle};
 
     #[test]
     fn points_that_count_less_cast_fewer_rays() {
@@ -456,17 +466,17 @@ mod tests {
         };
         let blocker = quad(0.5, [-1.0, 0.3], [-1.0, 1.0]);
         let positions = [quad(1.0, [-1.0, 1.0], [-1.0, 1.0]), blocker].concat();
-        let triangle = |corners: [u32; 3]| crate::scene::Triangle {
+        let triangle = |corners: [u32; 3]| Triangle {
             corners,
             material: corners[0] / 4,
             ..Default::default()
         };
         let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]].map(triangle).to_vec();
-        let grey = crate::scene::Material::grey("grey", 0.0);
-        let lamp = crate::scene::Material { exitance: Rgb::ONE, ..grey.clone() };
+        let grey = Material::grey("grey", 0.0);
+        let lamp = Material { exitance: Rgb::ONE, ..grey.clone() };
         let scene = Scene::new(positions, triangles, vec!["all".into()], vec![lamp, grey]);
-        let mesh = Mesh::new(std::sync::Arc::new(scene.unwrap()), 10.0).unwrap();
-        let light = crate::gather::GatheredMesh::from_elements(&mesh, &[Rgb::ZERO; 4]).unwrap();
+        let mesh = Mesh::new(Arc::new(scene.unwrap()), 10.0).unwrap();
+        let light = GatheredMesh::from_elements(&mesh, &[Rgb::ZERO; 4]).unwrap();
         let point = |k: u32| {
             let position = DVec3::new(0.002 * f64::from(k % 20), 0.05 * f64::from(k / 20), 0.0);
             GatherPoint { position, normal: DVec3::Z, near: 1e-4 }
@@ -479,11 +489,7 @@ mod tests {
             // Of the lamp, what is beyond the edge of the blocker as seen from the point.
             let edge = 0.6 - point.position.x;
             let strip = quad(1.0, [edge, 1.0], [-1.0, 1.0]);
-            let truth = crate::form_factor::closed_form::point_to_polygon(
-                point.position,
-                point.normal,
-                &strip,
-            );
+            let truth = point_to_polygon(point.position, point.normal, &strip);
             let off = (sample.irradiance.x - truth).abs() * 3f64.sqrt();
             far_off += u32::from(off > 3.0 * sample.noise);
             squares[0] += off * off;
