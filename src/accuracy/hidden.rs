@@ -7,7 +7,7 @@
 //! | share of backs, no light arrives | 0.05 | enclosed: no lit point sees it either |
 //! | share of backs nearer than [`NEAR`] | 0.4 | covered by what stands on it |
 //! | mean of 1/distance | 10⁴ | in a crack |
-//! | share of surfaces | 0.01 | in the open: the light of the sky is exact there |
+//! | share of surfaces, and of lamps in the light | 0.01 each | in the open: sky and sun are exact |
 //!
 //! At the foot of an inverted wall the share of backs is 0.5; 0.4 is two standard deviations of 128
 //! rays less. Between parallel plates the mean of 1/distance is 2/3 over their distance: in a room
@@ -29,6 +29,8 @@ pub(crate) const NEAR: f64 = 0.002;
 pub(crate) struct Outlook {
     /// Share of the hemisphere in which there is a surface.
     pub covered: f64,
+    /// Share of its light that lamps and luminaires send it directly.
+    pub lamps: f64,
     /// Share in which there is a back.
     pub backs: f64,
     /// Mean of 1/distance over the hemisphere, per scene unit.
@@ -38,12 +40,17 @@ pub(crate) struct Outlook {
 }
 
 impl Outlook {
+    /// Whether it sees almost no surface.
+    pub fn is_open(&self) -> bool {
+        self.covered < 0.01
+    }
+
     /// Whether the point is hidden where the light fills a box of this `diagonal`, scene unit.
     pub fn is_hidden(&self, diagonal: f64) -> bool {
         // Backs at one distance in a share of the hemisphere make its mean of 1/distance at least
         // that share over the distance.
         let covers = 0.4;
-        self.covered < 0.01
+        self.is_open() && self.lamps < 0.01
             || self.backs > if self.dark { 0.05 } else { 0.95 }
             || self.backs > covers && self.inverse_distance > covers / (NEAR * diagonal)
             || self.inverse_distance * 1e-4 * diagonal > 1.0
@@ -56,7 +63,8 @@ mod tests {
 
     #[test]
     fn each_condition_hides_by_itself() {
-        let room = Outlook { covered: 1.0, backs: 0.0, inverse_distance: 2.0, dark: false };
+        let seen = Outlook { covered: 1.0, inverse_distance: 2.0, ..Outlook::default() };
+        let room = seen;
         let chamber = Outlook { backs: 0.3, ..room };
         let foot = Outlook { backs: 0.5, ..room };
         for (outlook, hidden) in [
@@ -66,6 +74,7 @@ mod tests {
             (Outlook { dark: true, ..chamber }, true),
             (Outlook { backs: 0.96, ..room }, true),
             (Outlook { covered: 0.009, ..room }, true),
+            (Outlook { covered: 0.009, lamps: 0.011, ..room }, false),
             (foot, false),
             // 0.4 / 0.002 = 200, with half of the hemisphere in backs only.
             (Outlook { inverse_distance: 210.0, ..foot }, true),

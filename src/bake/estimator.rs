@@ -508,7 +508,12 @@ impl Sample {
             next: self.reflected(next),
             later: *later,
             element_residual: estimator.residual(self.element),
-            excluded: outlook([first, second]).is_hidden(estimator.diagonal),
+            excluded: outlook(
+                [first, second],
+                self.point.point.normal,
+                estimator.light.mesh.scene().sky(),
+            )
+            .is_hidden(estimator.diagonal),
             escaped: first.escaped,
         }
     }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::directional_light::{Direct, DirectionalLight};
-use super::gather_points::{VertexGatherPoints, outlook};
+use super::gather_points::VertexGatherPoints;
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
@@ -66,7 +66,7 @@ impl Batch<'_> {
             // (ρ + τ) E, which is darkness at a buried vertex.
             let albedo = points.albedo(v);
             let noise = reflected_noise(albedo, sample);
-            let is_hidden = outlook([sample; 2]).is_hidden(diagonal);
+            let is_hidden = points.outlook(v, sample).is_hidden(diagonal);
             let direct = match light {
                 Some(light) if !is_buried => {
                     light.reflected(albedo, &points.point(v, attempt), sample.directional)

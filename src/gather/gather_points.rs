@@ -17,7 +17,7 @@ use super::{GatherPoint, IrradianceSample};
 use crate::accuracy::hidden::Outlook;
 use crate::geometry::incidence::Incidence;
 use crate::mesh::{Mesh, NodeId};
-use crate::scene::{Material, Rgb, Scene};
+use crate::scene::{Material, Rgb, Scene, Sky};
 use crate::vertex::keys::Vertices;
 use crate::visibility::{buried, offset};
 
@@ -111,6 +111,11 @@ impl<'a> VertexGatherPoints<'a> {
         attempt + 1 < around.div_ceil(around.div_ceil(MAX_ATTEMPTS))
     }
 
+    /// What vertex `v` sees by `sample`.
+    pub fn outlook(&self, v: u32, sample: &IrradianceSample) -> Outlook {
+        outlook([sample; 2], self.normal(v), self.mesh.scene().sky())
+    }
+
     /// Whether `sample`, gathered for vertex `v`, is that of a buried point.
     pub fn is_buried(&self, v: u32, sample: &IrradianceSample) -> bool {
         self.sees_inside(v, sample.backface, sample.inverse_distance)
@@ -154,13 +159,20 @@ impl SurfaceOffset {
     }
 }
 
-/// What a point sees, by two gathers.
-pub(crate) fn outlook(gathers: [&IrradianceSample; 2]) -> Outlook {
-    let mean = |of: fn(&IrradianceSample) -> f64| gathers.map(of).iter().sum::<f64>() / 2.0;
+/// What a point on a surface of `normal` sees under `sky`, by two gathers.
+pub(crate) fn outlook(gathers: [&IrradianceSample; 2], normal: DVec3, sky: &Sky) -> Outlook {
+    let mean = |of: &dyn Fn(&IrradianceSample) -> f64| gathers.map(of).iter().sum::<f64>() / 2.0;
+    // Of either side: through a translucent surface, too.
+    let sun = sky.sun().and_then(|sun| sun.unoccluded(sun.direction.normalize().dot(normal).abs()));
+    let of_lamps = |gathered: &IrradianceSample| {
+        let lamps = (gathered.direct - sun.unwrap_or_default()).max(Rgb::ZERO).length();
+        if lamps > 0.0 { lamps / gathered.irradiance.length() } else { 0.0 }
+    };
     Outlook {
-        covered: 1.0 - mean(|gathered| gathered.escaped),
-        backs: mean(|gathered| gathered.backface),
-        inverse_distance: mean(|gathered| gathered.inverse_distance),
+        covered: 1.0 - mean(&|gathered| gathered.escaped),
+        lamps: mean(&of_lamps),
+        backs: mean(&|gathered| gathered.backface),
+        inverse_distance: mean(&|gathered| gathered.inverse_distance),
         dark: false,
     }
 }

@@ -184,6 +184,22 @@ impl<'a> PathTracer<'a> {
         (0..paths).map(|_| self.path(point, rng)).sum()
     }
 
+    /// Reflected radiosity at `point` by the light that lamps and luminaires send it directly, by as
+    /// many `samples`, W/m². Where a ray can meet a lamp, some of its light is missing.
+    pub(crate) fn from_lamps(&self, point: &SurfacePoint, samples: usize, rng: &mut Rng) -> Rgb {
+        let mut reflected = Rgb::ZERO;
+        for _ in 0..samples {
+            let (at, throughput) = self.start(point, rng);
+            let weights = self.emitters.weights(at.position);
+            let mut irradiance = self.next_event(&at, &weights, rng);
+            if !self.scene.luminaires().is_empty() {
+                irradiance += self.irradiance_of_luminaire(&at, rng);
+            }
+            reflected += throughput * irradiance;
+        }
+        reflected / samples as f64
+    }
+
     /// What those of `rays` rays from `point`, dense as the cosine, meet that meet anything.
     pub(crate) fn hits(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<Hit> {
         let normal = self.normals[point.triangle];

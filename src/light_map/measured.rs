@@ -64,7 +64,8 @@ impl LightMap {
         let points = self.shown_points();
         let mut gatherer = gatherer(baked, backend)?;
         let field = baked.light.radiosity_field();
-        let diagonal = baked.settings.solve.light_diagonal(self.atlas.scene());
+        let scene = self.atlas.scene();
+        let (diagonal, sky) = (baked.settings.solve.light_diagonal(scene), scene.sky());
         let mut errors = vec![];
         let order = golden_ratio_order(points.len());
         let (mut remaining, mut batches) = (&order[..], BatchSizer::new(64));
@@ -79,7 +80,8 @@ impl LightMap {
                 for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
                     let ShownPoint { albedo, shown, area, .. } = points[k];
                     let pair = [first, second];
-                    if !outlook(pair).is_hidden(diagonal) {
+                    let normal = points[k].points[0].point.normal;
+                    if !outlook(pair, normal, sky).is_hidden(diagonal) {
                         let gathered = pair.map(|sample| albedo * sample.irradiance);
                         errors.push(TexelError { shown, gathered, area });
                     }

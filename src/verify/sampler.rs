@@ -54,6 +54,9 @@ struct TracedPoint {
     solution: Option<Rgb>,
     /// Known with the first paths, as is whether the point is hidden.
     outlook: Outlook,
+    /// Reflected radiosity by direct light of lamps and luminaires, known with the first paths where
+    /// the point may be in the open, W/m².
+    from_lamps: Rgb,
     hidden: bool,
     paths: usize,
     /// Sums over the paths of each part, W/m².
@@ -101,6 +104,7 @@ impl<'a> Sampler<'a> {
                     weight,
                     solution: None,
                     outlook: Outlook::default(),
+                    from_lamps: Rgb::ZERO,
                     hidden: false,
                     paths: 0,
                     sums: [Rgb::ZERO; PARTS],
@@ -194,7 +198,9 @@ impl<'a> Sampler<'a> {
         let diagonal = self.lit_diagonal();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
             let dark = point.sample().measured() == Rgb::ZERO && point.paths >= PATHS_IN_THE_DARK;
-            point.hidden = Outlook { dark, ..point.outlook }.is_hidden(diagonal);
+            let all = point.sample().measured().length();
+            let lamps = if all > 0.0 { point.from_lamps.length() / all } else { 0.0 };
+            point.hidden = Outlook { dark, lamps, ..point.outlook }.is_hidden(diagonal);
         }
         ControlFlow::Continue(())
     }
@@ -227,6 +233,9 @@ impl<'a> Sampler<'a> {
         if point.paths == 0 {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
             traced.outlook = outlook(&self.tracer, &point.point, &mut rng);
+            if traced.outlook.is_open() {
+                traced.from_lamps = self.tracer.from_lamps(&point.point, 64, &mut rng);
+            }
         }
         traced.paths = paths;
         traced
@@ -371,7 +380,7 @@ fn outlook(tracer: &PathTracer, point: &SurfacePoint, rng: &mut Rng) -> Outlook 
         covered: share * hits.len() as f64,
         backs: share * hits.iter().filter(|hit| !hit.front).count() as f64,
         inverse_distance: share * hits.iter().map(|hit| 1.0 / hit.distance).sum::<f64>(),
-        dark: false,
+        ..Outlook::default()
     }
 }
 

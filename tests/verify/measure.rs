@@ -4,13 +4,14 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::DVec3;
+use radiosity::bake::Outcome;
 use radiosity::scene::Sides;
 use radiosity::verify::{Progress, Settings, Stop, Verification, Verifier, verify};
-use radiosity::{ErrorKind, Material, Rgb, Scene, Triangle, VertexMesh};
+use radiosity::{Backend, BakeTarget, ErrorKind, Material, Rgb, Scene, Sky, Triangle, VertexMesh};
 
 use crate::common::keep_going;
 use crate::common::scenes::{
-    block, facing_down, facing_up, lamp, paint, quads, standing_block, walls,
+    Quad, block, facing_down, facing_up, lamp, paint, quads, standing_block, walls,
 };
 
 /// A solution with a radiosity for each triangle.
@@ -265,6 +266,33 @@ fn what_is_hidden_is_left_out_and_said() {
     let tolerance = 3.0 * 0.4 * expected * (1.0 / count(&found) + 1.0 / count(&all)).sqrt();
     assert!(tolerance < 0.12, "{tolerance}");
     assert!((ratio - expected).abs() < tolerance, "{ratio}, {tolerance}");
+}
+
+#[test]
+fn open_ground_counts_where_a_lamp_lights_it() {
+    let ground = |light: Option<Quad>, sky: f64| {
+        let mut all = vec![(facing_up([-5.0, 5.0], [-5.0, 5.0], 0.0), paint(0.5, 0.0))];
+        all.extend(light.map(|quad| (quad, lamp([100.0; 3]))));
+        quads(&all).with_sky(Sky::uniform(Rgb::splat(sky))).unwrap()
+    };
+    let hidden_share = |scene: Scene| {
+        let baked = BakeTarget::Error(0.05).bake(scene, &Backend::Cpu, keep_going).unwrap();
+        let scene = baked.light.mesh.scene();
+        let found = verify(scene, &baked.light.surface, &settings(0.1), keep_going).unwrap();
+        // The light of a sky alone is exact, so that nothing is left to measure.
+        if found.groups[0].hidden_share == 0.0 {
+            let (estimated, found) = (baked.estimate.total, found.error.unwrap().value);
+            assert!(baked.outcome == Outcome::Reached && found < 0.05, "{found}");
+            assert!((0.5..2.0).contains(&(estimated / found)), "{estimated} {found}");
+            // One field of light of one lamp: not the half a million that there may be.
+            assert!(baked.light.mesh.element_count() < 5000);
+        }
+        found.groups[0].hidden_share
+    };
+    // It covers 4e-4 of the hemisphere right below it, and sends 0.04 of 3 W/m² there.
+    let small = facing_down([-0.1, 0.1], [-0.1, 0.1], 3.0);
+    assert_eq!(hidden_share(ground(Some(small), 0.0)), 0.0);
+    assert_eq!(hidden_share(ground(None, 1.0)), 1.0);
 }
 
 #[test]
