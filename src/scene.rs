@@ -105,12 +105,30 @@ pub struct Scene {
     cut_sides: Vec<[bool; 3]>,
     /// See [`Scene::crease_degrees`].
     crease_degrees: Option<f64>,
-    /// See [`Scene::is_back_covered`]; computed on first use.
-    covered_backs: OnceLock<Covers>,
-    /// See [`Scene::clear_panes`]; computed on first use.
-    clear_panes: OnceLock<Option<ClearPanes>>,
+    /// What follows from the shape; scenes of one shape share it.
+    shape: Arc<Shape>,
     /// See [`Scene::derived`].
     derived: Derived,
+}
+
+/// What follows from the corners and holes of triangles and from which materials are clear, whatever
+/// else a scene has; computed on first use.
+#[derive(Debug, Default)]
+struct Shape {
+    /// See [`Scene::is_back_covered`].
+    covered_backs: OnceLock<Covers>,
+    /// See [`Scene::clear_panes`].
+    clear_panes: OnceLock<Option<ClearPanes>>,
+    /// See [`Scene::derived_from_shape`].
+    derived: Derived,
+}
+
+/// Corners of all triangles by position numbers, equal positions having one number.
+#[derive(Debug)]
+pub(crate) struct WeldedCorners {
+    pub corners: Vec<[u32; 3]>,
+    /// How many positions there are.
+    pub positions: usize,
 }
 
 impl Scene {
@@ -186,8 +204,7 @@ impl Scene {
             textures: SceneTextures::of_coordinates(texture_coordinates).into(),
             cut_sides: vec![],
             crease_degrees: None,
-            covered_backs: OnceLock::new(),
-            clear_panes: OnceLock::new(),
+            shape: Arc::default(),
             derived: Derived::default(),
         };
         if !textures.is_empty() {
@@ -240,17 +257,18 @@ impl Scene {
         self.triangles[t].corners.map(|k| self.positions[k as usize])
     }
 
-    /// Corners of all triangles by position numbers, equal positions having one number; and the
-    /// count of numbers.
-    pub(crate) fn welded_corners(&self) -> (Vec<[u32; 3]>, usize) {
-        let mut weld = Weld::default();
-        let mut numbers = vec![None; self.positions.len()];
-        let mut number = |corner: u32| {
-            let k = corner as usize;
-            *numbers[k].get_or_insert_with(|| weld.number(self.positions[k]))
-        };
-        let corners = self.triangles.iter().map(|t| t.corners.map(&mut number)).collect();
-        (corners, weld.positions.len())
+    /// Corners of all triangles by position numbers; computed once.
+    pub(crate) fn welded_corners(&self) -> Arc<WeldedCorners> {
+        self.derived_from_shape(|scene| {
+            let mut weld = Weld::default();
+            let mut numbers = vec![None; scene.positions.len()];
+            let mut number = |corner: u32| {
+                let k = corner as usize;
+                *numbers[k].get_or_insert_with(|| weld.number(scene.positions[k]))
+            };
+            let corners = scene.triangles.iter().map(|t| t.corners.map(&mut number)).collect();
+            WeldedCorners { corners, positions: weld.positions.len() }
+        })
     }
 
     /// Unit normal of triangle `t`, on its front.
@@ -301,12 +319,12 @@ impl Scene {
     }
 
     fn covered_backs(&self) -> &Covers {
-        self.covered_backs.get_or_init(|| covered_backs::covered_backs(self))
+        self.shape.covered_backs.get_or_init(|| covered_backs::covered_backs(self))
     }
 
     /// The panes that light passes; none in a scene without them.
     pub(crate) fn clear_panes(&self) -> Option<&ClearPanes> {
-        self.clear_panes.get_or_init(|| glass_bodies::clear_panes(self)).as_ref()
+        self.shape.clear_panes.get_or_init(|| glass_bodies::clear_panes(self)).as_ref()
     }
 
     /// Whether there are panes that light passes.
@@ -368,8 +386,7 @@ impl Scene {
         let mut scene = Scene { materials, ..self.clone() };
         let mut both = scene.materials.iter().zip(&self.materials);
         if both.any(|(new, old)| new.clear_transmittance() != old.clear_transmittance()) {
-            // Covers, too, depend on which materials are clear.
-            (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
+            scene.shape = Arc::default();
         }
         Ok(scene)
     }
@@ -424,19 +441,19 @@ impl Scene {
         Scene { crease_degrees: Some(degrees), ..self.clone() }
     }
 
-    /// The result of `make` for the scene, computed once for each type: the ray hierarchy, the
-    /// smooth surfaces and other data that this module does not define.
+    /// The result of `make` for the scene, computed once for each type: smooth surfaces, lights and
+    /// other data that this module does not define.
     pub(crate) fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Scene) -> T) -> Arc<T> {
         self.derived.get(|| make(self))
     }
 
-    /// The same scene with what was computed of `other` by [`Scene::derived`], of this type: for a
-    /// scene that does not differ in what it is computed from.
-    pub(crate) fn with_derived_of<T: Any + Send + Sync>(self, other: &Scene) -> Scene {
-        if let Some(known) = other.derived.known::<T>() {
-            self.derived.keep(known);
-        }
-        self
+    /// The same of what follows from the shape alone, as the ray hierarchy does: scenes with other
+    /// skies, creases or materials share it, unless other materials are clear.
+    pub(crate) fn derived_from_shape<T: Any + Send + Sync>(
+        &self,
+        make: impl FnOnce(&Scene) -> T,
+    ) -> Arc<T> {
+        self.shape.derived.get(|| make(self))
     }
 
     /// The comments before the geometry of its file, without `#`: often the program that wrote it.

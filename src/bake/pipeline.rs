@@ -18,7 +18,6 @@ use crate::mesh::{Mesh, cut_at_contacts, cut_large_triangles};
 use crate::progress::StopReason;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
-use crate::visibility::ray_scene::RayScene;
 
 impl BakeSettings {
     /// Bakes `scene` as far as these settings go, without regard to the estimated error.
@@ -166,8 +165,7 @@ fn cut_scene(
 /// `scene`, with creases where it does not say and normals differ by more than this.
 fn with_creases(scene: &Arc<Scene>, degrees: f64) -> Arc<Scene> {
     match scene.triangles().iter().any(|t| t.smoothing.is_none()) {
-        // Rays do not see creases.
-        true => Arc::new(scene.with_crease_degrees(degrees).with_derived_of::<RayScene>(scene)),
+        true => Arc::new(scene.with_crease_degrees(degrees)),
         false => scene.clone(),
     }
 }

@@ -28,9 +28,10 @@ const MAX_TRIANGLES: usize = 256;
 /// The covered backs of `scene`.
 pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let count = scene.triangles().len();
-    let (corners, positions) = scene.welded_corners();
+    let welded = &*scene.welded_corners();
+    let corners = &welded.corners[..];
     let meeting =
-        Incidence::new(positions, || corners.iter().map(<[u32; 3]>::as_slice).enumerate());
+        Incidence::new(welded.positions, || corners.iter().map(<[u32; 3]>::as_slice).enumerate());
     let normals = (0..count).into_par_iter().map(|t| scene.normal(t)).collect();
     let surfaces = Surfaces { scene, normals, corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
@@ -43,7 +44,7 @@ struct Surfaces<'a> {
     scene: &'a Scene,
     normals: Vec<DVec3>,
     /// Per triangle, the positions of its corners by number.
-    corners: Vec<[u32; 3]>,
+    corners: &'a [[u32; 3]],
     /// The triangles that meet at each position.
     meeting: Incidence,
 }

@@ -4,7 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 
-use super::{Scene, Triangle};
+use super::derived::Derived;
+use super::{Scene, Shape, Triangle};
 
 /// A piece of a triangle of a scene.
 pub(crate) struct Piece {
@@ -49,11 +50,14 @@ impl Scene {
             firsts.push(scene.triangles.len() as u32);
         }
         scene.textures = Arc::new(textures);
+        scene.shape = Arc::new(Shape {
+            covered_backs: OnceLock::from(self.covered_backs().cut(&firsts)),
+            clear_panes: OnceLock::from(self.clear_panes().map(|panes| panes.cut(&firsts))),
+            derived: Derived::default(),
+        });
         if self.has_cut_outs() {
             scene.find_solid_shares();
         }
-        scene.covered_backs = OnceLock::from(self.covered_backs().cut(&firsts));
-        scene.clear_panes = OnceLock::from(self.clear_panes().map(|panes| panes.cut(&firsts)));
         scene
     }
 

@@ -126,9 +126,7 @@ impl TextureMap {
             return 1.0;
         }
         let [a, b, c] = corners.map(|uv| uv * self.scale + self.offset);
-        let is_within = |p: &DVec2| p.min_element() >= 0.0 && p.max_element() <= 1.0;
-        let is_exact = !self.clamped || [a, b, c].iter().all(is_within);
-        let share = if is_exact && (b - a).perp_dot(c - a) != 0.0 {
+        let share = if (b - a).perp_dot(c - a) != 0.0 {
             self.texture.mean_by_cells([a, b, c], self.clamped, cells).x
         } else {
             let places = spread_over(corners, points_across(cells));

@@ -26,12 +26,12 @@ impl Derived {
     }
 
     /// The value, if it was computed.
-    pub fn known<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
+    fn known<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
         find(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Keeps `value`, unless there is one; the one that is kept.
-    pub fn keep<T: Any + Send + Sync>(&self, value: Arc<T>) -> Arc<T> {
+    fn keep<T: Any + Send + Sync>(&self, value: Arc<T>) -> Arc<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         find(&all).unwrap_or_else(|| {
             all.push(value.clone());

@@ -33,7 +33,8 @@ impl Scene {
                 HalfEdge { ends: [a.min(b), a.max(b)], triangle, corner, reversed: a > b }
             })
         };
-        let corners = self.welded_corners().0.into_iter().enumerate();
+        let welded = self.welded_corners();
+        let corners = welded.corners.iter().copied().enumerate();
         let mut all: Vec<HalfEdge> = corners.flat_map(of_triangle).collect();
         all.par_sort_unstable();
         all

@@ -12,7 +12,7 @@
 //! rays treat them like any other triangles.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::texture::MaterialTextures;
 use super::{Material, Rgb, Scene};
@@ -97,7 +97,6 @@ impl Scene {
             textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
             textures.solid_shares.extend(self.textures.solid_shares.get(t));
         }
-        (scene.covered_backs, scene.clear_panes) = (OnceLock::new(), OnceLock::new());
-        Scene { textures: Arc::new(textures), ..scene }
+        Scene { textures: Arc::new(textures), shape: Arc::default(), ..scene }
     }
 }

@@ -211,9 +211,9 @@ impl Scene {
             }))
         };
         let numbers: Vec<Option<u32>> = pieces.iter().map(number_of).collect();
-        // For all pieces together about half a second on two cores; with 64 cells a mean is off by
-        // some 1e-2 of the contrast.
-        let cells = 1e6 / different.len().max(1) as f64;
+        // For all pieces together at most about 0.15 s; with 64 cells a mean is off by some 1e-2
+        // of the contrast.
+        let cells = 3e6 / different.len().max(1) as f64;
         let cells = cells.clamp(64.0, MAX_OUTLINE_CELLS);
         let found = different.par_iter().map(|&(map, mask, place)| find(map, mask, place, cells));
         let found: Vec<T> = found.collect();

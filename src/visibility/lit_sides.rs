@@ -34,7 +34,6 @@ use rayon::prelude::*;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::sampling::hash::split_mix64;
 use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
-use crate::visibility::ray_scene::RayScene;
 use closed_rooms::closed_rooms;
 use lamp_backs::LampBacks;
 use repeated::repeated_triangles;
@@ -82,11 +81,7 @@ impl Scene {
             (WarningKind::Winding, count(|t| t.turned), "turned"),
             (WarningKind::BothSides, count(|t| t.doubled), "reflecting on both"),
         ];
-        let treated = scene.treated(&treatments);
-        scene = match treatments.iter().all(|treatment| *treatment == Treatment::default()) {
-            true => treated.with_derived_of::<RayScene>(&scene),
-            false => treated,
-        };
+        scene = scene.treated(&treatments);
         for (kind, groups, done) in warnings.into_iter().filter(|(_, groups, _)| !groups.is_empty())
         {
             let names = groups.iter().map(|&g| self.groups()[g as usize].as_str());

@@ -97,7 +97,7 @@ impl RayScene {
 
     /// The triangles of `scene` that block light, by their indices: built once per scene.
     pub fn of_scene(scene: &Scene) -> Arc<RayScene> {
-        scene.derived(RayScene::made_of)
+        scene.derived_from_shape(RayScene::made_of)
     }
 
     /// The same with clear triangles, which do not affect light but are visible.
@@ -426,6 +426,11 @@ mod tests {
         let scene = Scene::new(at(1.0).to_vec(), vec![triangle], vec!["all".into()], grey).unwrap();
         let rays = RayScene::of_scene(&scene);
         assert!(Arc::ptr_eq(&rays, &RayScene::of_scene(&scene)));
+        // As have all scenes of this shape.
+        let black = scene.with_materials(vec![Material::grey("black", 0.0)]).unwrap();
+        for alike in [scene.with_crease_degrees(1.0), black, scene.resolve_sides()] {
+            assert!(Arc::ptr_eq(&rays, &RayScene::of_scene(&alike)));
+        }
         let glass = Specular::Glass { refractive_index: 1.5, transmittance: Rgb::ONE };
         let clear = Material { specular: Some(glass), ..Material::grey("clear", 0.0) };
         let changed = scene.with_materials(vec![clear]).unwrap();

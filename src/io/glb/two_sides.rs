@@ -118,8 +118,9 @@ fn sheets(scene: &Scene) -> Vec<Vec<usize>> {
     if seconds.is_empty() {
         return vec![];
     }
-    let (corners, positions) = scene.welded_corners();
-    let mut connected = UnionFind::new(positions);
+    let welded = scene.welded_corners();
+    let corners = &welded.corners;
+    let mut connected = UnionFind::new(welded.positions);
     for &s in &seconds {
         let [a, b, c] = corners[s].map(|corner| corner as usize);
         connected.join(a, b);

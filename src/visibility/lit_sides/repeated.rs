@@ -10,11 +10,11 @@ use crate::scene::{Rgb, Scene, Sides};
 /// positions, material, group and texture coordinates as an earlier one; and the same winding, if
 /// it emits.
 pub fn repeated_triangles(scene: &Scene) -> Vec<bool> {
-    let (all_corners, _) = scene.welded_corners();
+    let welded = scene.welded_corners();
     let mut known: FxHashMap<_, usize> = FxHashMap::default();
     let mut is_repeated = |t: usize| {
         let triangle = &scene.triangles()[t];
-        let (corners, winding) = sorted(all_corners[t]);
+        let (corners, winding) = sorted(welded.corners[t]);
         let winding = (scene.exitance(t) != Rgb::ZERO).then_some(winding);
         let key = (corners, winding, triangle.material, triangle.group);
         let first = *known.entry(key).or_insert(t);
