@@ -35,6 +35,7 @@ use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;
 use solution::SolutionLookup;
+use statistics::PARTS;
 pub(crate) use surfaces::octaves_of;
 pub use verification::{GroupError, PointError, Progress, Stop, Verification};
 
@@ -136,6 +137,22 @@ impl<'a> Verifier<'a> {
         let solution = SolutionLookup::new(solution, self.sampler.scene())?;
         self.sampler.forget();
         self.sampler.look_up(&solution)?;
+        Ok(Verification { stop: Stop::Rounds, ..self.sampler.verification().0 })
+    }
+
+    /// Measures `solution` in one round, by this many `paths` over all points.
+    ///
+    /// # Errors
+    /// Those of [`Verifier::measure`].
+    pub(crate) fn measure_once(
+        &mut self,
+        paths: usize,
+        solution: &dyn Solution,
+    ) -> Result<Verification, Error> {
+        self.sampler.add_points(self.points);
+        self.sampler.look_up(solution)?;
+        let of_point = (paths / self.sampler.drawn().max(1)).max(PARTS).next_multiple_of(PARTS);
+        let _ = self.sampler.trace(of_point, |_, _| ControlFlow::Continue(()));
         Ok(Verification { stop: Stop::Rounds, ..self.sampler.verification().0 })
     }
 

@@ -2,7 +2,7 @@
 
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 
@@ -22,6 +22,8 @@ pub(super) struct ErrorTarget<'a> {
 /// A limit of time, and what to do with time that is left.
 #[derive(Clone, Copy)]
 pub(super) struct Within {
+    /// When vertices stop gathering.
+    pub gather_until: Instant,
     /// When the estimate of the error has to be done.
     pub deadline: Instant,
     /// The error at which the bake ends earlier, in [0, 1).
@@ -43,6 +45,12 @@ impl ErrorTarget<'_> {
     /// alone, 5 %.
     pub fn finest(&self) -> f64 {
         self.within.map_or(self.error, |within| within.least_error.max(0.05).min(self.error))
+    }
+
+    /// The time until the estimate of the error begins; without a limit, any.
+    pub fn time_left(&self) -> Duration {
+        let left = |within: Within| within.gather_until.saturating_duration_since(Instant::now());
+        self.within.map_or(Duration::MAX, left)
     }
 
     /// Whether the time is over.

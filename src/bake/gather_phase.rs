@@ -13,6 +13,8 @@
 //! Without a target there is no pilot, and the first estimate is the last.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use crate::accuracy::Measure;
 use crate::backend::cpu::RayGather;
@@ -55,7 +57,7 @@ pub(super) struct GatherPhase<'a> {
     shot: &'a ShotLight,
     validator: Validator<'a>,
     paths: PathTracer<'a>,
-    octaves: Octaves,
+    octaves: Arc<Octaves>,
     /// Reflected radiosity of all surfaces that is the least error before any vertex has gathered,
     /// W/m² per channel.
     even: Rgb,
@@ -264,28 +266,44 @@ impl<'a> GatherPhase<'a> {
         }
     }
 
-    /// All vertices gather what is emitted and exchange it, by few rays. Where that is stopped on
-    /// the way, what they would have exchanged is added evenly (the ambient term of Cohen et al.
-    /// 1988).
+    /// All vertices gather what is emitted and exchange it, by few rays, and once more by as many as
+    /// the time permits.
     fn first_light(
         &mut self,
         progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
     ) -> Result<StopReason, Error> {
-        // Without near fields: what is near is dark in the source, which is no solution.
-        let mut gatherer =
-            self.backend.gather_evenly(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
-        let rows = RayGather::new(&self.shot.mesh, model::RAYS_OF_FIRST_LIGHT)?;
-        let settings = self.gather.refinement.clone();
-        if self.state.gather_all(&settings, &mut *gatherer, progress)? == StopReason::Cancelled {
-            return Ok(StopReason::Cancelled);
-        }
-        let stop = self.state.add_further_bounces(&rows, progress);
-        if stop == StopReason::Cancelled {
+        let [least, most] = model::RAYS_OF_FIRST_LIGHT;
+        let start = Instant::now();
+        let stop = self.exchange_by(least, progress)?;
+        if stop == StopReason::Cancelled && self.state.bounces().is_finite() {
+            // What they would have exchanged, evenly (the ambient term of Cohen et al. 1988).
             let albedo = self.shot.mesh.mean_albedo();
             self.state
                 .add_even_light(self.even * albedo / (Rgb::ONE - albedo).max(Rgb::splat(0.05)));
         }
-        Ok(stop)
+        // As much time for each ray.
+        let left = self.target.map_or(Duration::MAX, |target| target.time_left());
+        let rays = (f64::from(least) * left.div_duration_f64(start.elapsed())).min(most.into());
+        match rays >= 2.0 * f64::from(least) && stop != StopReason::Cancelled {
+            true => self.exchange_by(rays as u32, progress),
+            false => Ok(stop),
+        }
+    }
+
+    /// All vertices gather, and exchange what they have, by as many `rays` each.
+    fn exchange_by(
+        &mut self,
+        rays: u32,
+        progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
+    ) -> Result<StopReason, Error> {
+        // Without near fields: what is near is dark in the source, which is no solution.
+        let mut gatherer = self.backend.gather_evenly(&self.shot.mesh, rays)?;
+        let rows = RayGather::new(&self.shot.mesh, rays)?;
+        let settings = self.gather.refinement.clone();
+        match self.state.gather_all(&settings, &mut *gatherer, progress)? {
+            StopReason::Cancelled => Ok(StopReason::Cancelled),
+            _ => Ok(self.state.add_further_bounces(&rows, progress)),
+        }
     }
 
     /// What was gathered as a mesh, with its estimated error.
@@ -348,14 +366,15 @@ impl<'a> GatherPhase<'a> {
         reporter: &mut Reporter,
         clock: &mut StageClock,
     ) -> Estimated {
-        let Estimated { light, mut error, mut cancelled } = estimated;
+        let Estimated { light, error, mut cancelled } = estimated;
         let was_stopped = cancelled;
+        if was_stopped && self.is_within_time() {
+            // Vertices before and after a bounce make no series of bounces.
+            let error = self.validator.measured_at_once(error, &light);
+            clock.timings.estimate += clock.lap();
+            return Estimated { light, error, cancelled };
+        }
         let paths = match was_stopped {
-            true if self.is_within_time() => {
-                // Vertices before and after a bounce make no series of bounces.
-                error.whole.uncertainty = error.whole.total;
-                [validator::LEAST_PATHS; 2]
-            }
             true => [validator::MIN_PATHS; 2],
             false => {
                 let [paths, in_doubt] = validator::paths(light.gather_count, self.gather.rays);

@@ -62,13 +62,13 @@ pub(super) fn bake_in_time(
         overrides(settings);
         settings.solve.checkpoint = None;
     };
-    let within = Some(Within { deadline: start + limit, least_error });
+    let gather_until = start + limit.mul_f64(1.0 - SHARE_OF_ESTIMATE);
+    let within = Some(Within { gather_until, deadline: start + limit, least_error });
     let target = ErrorTarget { error: least_error.max(FIRST_ERROR), each_group, overrides, within };
     let (is_over, cancelled) = (Cell::new(false), Cell::new(false));
     let until: ProgressCallback = &mut |stage| {
         cancelled.set(cancelled.get() || progress(stage).is_break());
-        let is_late = start.elapsed() >= limit.mul_f64(1.0 - SHARE_OF_ESTIMATE);
-        is_over.set(cancelled.get() || is_late);
+        is_over.set(cancelled.get() || Instant::now() >= gather_until);
         if is_over.get() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let settings = settings_for(&target, scene);

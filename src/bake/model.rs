@@ -102,9 +102,9 @@ pub(super) fn min_rays(vertices: usize) -> f64 {
     (f64::from(1 << 21) / vertices.max(1) as f64).clamp(*RAYS.start(), 512.0)
 }
 
-/// Rays of a vertex, and of its row, by which light is first known where time is limited. Plain
-/// choice.
-pub(super) const RAYS_OF_FIRST_LIGHT: u32 = 16;
+/// Rays of a vertex, and of its row, by which light is first known where time is limited, and up to
+/// which it is known better before elements are split. Plain choice.
+pub(super) const RAYS_OF_FIRST_LIGHT: [u32; 2] = [4, 16];
 
 /// Minimum number of rays of a gather that only lights the next one. With 16 a city of 18 454
 /// triangles was split into four times as many elements by their noise.

@@ -36,22 +36,22 @@ impl Aabb {
     /// each axis; none if they have no weight or all coincide.
     pub fn around_most(points: &[(DVec3, f64)], share: f64) -> Option<Aabb> {
         let total: f64 = points.iter().map(|(_, weight)| weight).sum();
-        let end = |axis: usize, sign: f64| {
-            let mut along: Vec<(f64, f64)> =
-                points.iter().map(|&(at, weight)| (sign * at[axis], weight)).collect();
-            along.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let first_within = |mut along: Box<dyn Iterator<Item = &(f64, f64)> + '_>| {
             let mut outside = 0.0;
-            let first_within = along.into_iter().find(|(_, weight)| {
+            let first = along.find(|(_, weight)| {
                 outside += weight;
                 outside > share * total
             });
-            first_within.map(|(at, _)| sign * at)
+            first.map(|&(at, _)| at)
         };
-        let ends = |sign: f64| {
-            let [x, y, z] = [0, 1, 2].map(|axis| end(axis, sign));
-            Some(DVec3::new(x?, y?, z?))
-        };
-        let (low, high) = (ends(1.0)?, ends(-1.0)?);
+        let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+        for axis in 0..3 {
+            let mut along: Vec<(f64, f64)> =
+                points.iter().map(|&(at, weight)| (at[axis], weight)).collect();
+            along.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            low[axis] = first_within(Box::new(along.iter()))?;
+            high[axis] = first_within(Box::new(along.iter().rev()))?;
+        }
         (total > 0.0 && low != high).then_some(Aabb { low, high })
     }
 

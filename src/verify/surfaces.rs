@@ -4,6 +4,8 @@
 //! distance from the place that most of the scene is in ([`octaves`](crate::sampling::octaves)):
 //! where all is near, that is evenly too. Each stands for the area over which it was spread.
 
+use std::sync::Arc;
+
 use fastrand::Rng;
 use glam::DVec3;
 
@@ -70,11 +72,13 @@ impl ReflectingGroup {
     }
 }
 
-/// The octaves of distance over which points of `scene` are spread.
-pub(crate) fn octaves_of(scene: &Scene) -> Octaves {
-    let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters());
-    let middle = |t: usize| scene.corners(t).iter().sum::<DVec3>() / 3.0;
-    Octaves::new(reflecting.map(middle), scene.reflecting_bounds().diagonal())
+/// The octaves of distance over which points of `scene` are spread; computed once.
+pub(crate) fn octaves_of(scene: &Scene) -> Arc<Octaves> {
+    scene.derived(|scene| {
+        let reflecting = (0..scene.triangles().len()).filter(|&t| scene.material(t).scatters());
+        let middle = |t: usize| scene.corners(t).iter().sum::<DVec3>() / 3.0;
+        Octaves::new(reflecting.map(middle), scene.reflecting_bounds().diagonal())
+    })
 }
 
 /// The parts of a group's `triangles` that points are spread over.
