@@ -224,8 +224,8 @@ impl<'a> GatherPhase<'a> {
         let mut progress = |p: &GatherProgress| reporter.report(BakeProgress::Gathering(*p));
         match step {
             Step::FirstLight => match self.first_light(&mut progress)? {
-                StopReason::Cancelled => Ok(StopReason::Cancelled),
-                _ => self.gather(Step::AllPasses, reporter),
+                Some(next) => self.gather(next, reporter),
+                None => Ok(StopReason::Cancelled),
             },
             Step::AllPasses => {
                 let mut probes = self.probe_gatherer()?;
@@ -267,27 +267,38 @@ impl<'a> GatherPhase<'a> {
     }
 
     /// All vertices gather what is emitted and exchange it, by few rays, and once more by as many as
-    /// the time permits.
+    /// the time permits. The step that follows, unless stopped: all passes, where they take less
+    /// than half of the time that is left, else elements are split by few rays.
     fn first_light(
         &mut self,
         progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
-    ) -> Result<StopReason, Error> {
+    ) -> Result<Option<Step>, Error> {
+        let left = |target: Option<ErrorTarget>| target.map_or(Duration::MAX, |t| t.time_left());
         let [least, most] = model::RAYS_OF_FIRST_LIGHT;
         let start = Instant::now();
-        let stop = self.exchange_by(least, progress)?;
-        if stop == StopReason::Cancelled && self.state.bounces().is_finite() {
+        if self.exchange_by(least, progress)? == StopReason::Cancelled {
             // What they would have exchanged, evenly (the ambient term of Cohen et al. 1988).
             let albedo = self.shot.mesh.mean_albedo();
             self.state
                 .add_even_light(self.even * albedo / (Rgb::ONE - albedo).max(Rgb::splat(0.05)));
+            return Ok(None);
         }
-        // As much time for each ray.
-        let left = self.target.map_or(Duration::MAX, |target| target.time_left());
-        let rays = (f64::from(least) * left.div_duration_f64(start.elapsed())).min(most.into());
-        match rays >= 2.0 * f64::from(least) && stop != StopReason::Cancelled {
-            true => self.exchange_by(rays as u32, progress),
-            false => Ok(stop),
+        // A ray of a vertex, and one of its row.
+        let mut time_per_ray = start.elapsed() / least;
+        let rays = left(self.target).div_duration_f64(time_per_ray).min(most.into()) as u32;
+        if rays >= 2 * least {
+            let start = Instant::now();
+            if self.exchange_by(rays, progress)? == StopReason::Cancelled {
+                return Ok(None);
+            }
+            time_per_ray = start.elapsed() / rays;
         }
+        if time_per_ray * self.gather.rays < left(self.target) {
+            return Ok(Some(Step::AllPasses));
+        }
+        self.gather.rays = model::RAYS_IN_HASTE;
+        self.gatherer = self.gatherer(1)?;
+        Ok(Some(Step::Split))
     }
 
     /// All vertices gather, and exchange what they have, by as many `rays` each.
