@@ -149,6 +149,7 @@ impl<'a> Verifier<'a> {
         paths: usize,
         solution: &dyn Solution,
     ) -> Result<Verification, Error> {
+        self.sampler.forget();
         self.sampler.add_points(self.points);
         self.sampler.look_up(solution)?;
         let of_point = (paths / self.sampler.drawn().max(1)).max(PARTS).next_multiple_of(PARTS);

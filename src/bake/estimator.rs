@@ -78,6 +78,7 @@ pub(super) struct ErrorEstimator<'a> {
 }
 
 /// The estimated error of a result.
+#[derive(Clone)]
 pub(super) struct EstimatedError {
     pub whole: ErrorEstimate,
     /// The whole, by light instead of area.

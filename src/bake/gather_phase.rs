@@ -28,7 +28,7 @@ use crate::bake::result::BakedLight;
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 use crate::bake::shooting_phase::ShotLight;
 use crate::bake::strata::SampleCounts;
-use crate::bake::validator::{self, Validator};
+use crate::bake::validator::{self, LinearFit, Validator};
 use crate::error::Error;
 use crate::gather::Gather;
 use crate::gather::adaptive::{AdaptiveGather, Gatherers};
@@ -43,6 +43,9 @@ use crate::verify::octaves_of;
 
 /// Maximum number of rounds of refinement to one target. Plain choice.
 const MAX_ROUNDS: u32 = 12;
+
+/// Measured error above which a bake whose time is over is fitted to the truth. Plain choice.
+const NOISY: f64 = 0.3;
 
 /// Vertices that gather what was shot.
 pub(super) struct GatherPhase<'a> {
@@ -381,9 +384,19 @@ impl<'a> GatherPhase<'a> {
         let was_stopped = cancelled;
         if was_stopped && self.is_within_time() {
             // Vertices before and after a bounce make no series of bounces.
-            let error = self.validator.measured_at_once(error, &light);
+            let (error, fit) = self.validator.measured_at_once(error, &light);
+            let mut best = Estimated { light, error, cancelled };
+            if best.error.whole.total > NOISY
+                && let Some(fit) = fit
+                && let Some(light) = self.fitted(fit)
+            {
+                let (error, _) = self.validator.measured_at_once(best.error.clone(), &light);
+                if error.whole.total < best.error.whole.total {
+                    best = Estimated { light, error, ..best };
+                }
+            }
             clock.timings.estimate += clock.lap();
-            return Estimated { light, error, cancelled };
+            return best;
         }
         let paths = match was_stopped {
             true => [validator::MIN_PATHS; 2],
@@ -403,6 +416,16 @@ impl<'a> GatherPhase<'a> {
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(error.whole)).is_break();
         Estimated { light, error, cancelled }
+    }
+
+    /// What was gathered, by a `fit` to the truth: of noise in the dark, which is more than all light
+    /// there, little is left, and an even light in its place. None where light comes from points, as
+    /// the sun, which is reconstructed apart.
+    fn fitted(&mut self, LinearFit { share, even }: LinearFit) -> Option<GatheredMesh> {
+        self.state.scale_light(share)?;
+        self.state.add_even_light(even);
+        let (light, _) = self.state.interpolated(&self.gather.refinement).ok()?;
+        Some(GatheredMesh { stop: StopReason::Cancelled, ..light })
     }
 
     /// Chooses the rays per vertex by the difference of two gathers of `light` at 256 points, and

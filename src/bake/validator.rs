@@ -59,12 +59,49 @@ pub(super) struct Validator<'a> {
     each_group: bool,
     /// None before the first result.
     verifier: Option<Verifier<'a>>,
+    /// Of measurements at once.
+    at_once: Option<Verifier<'a>>,
+}
+
+/// The light `share` · B + `even` that is nearest to the truth, where a bake has the reflected
+/// radiosity B, by the square of the relative error over some points.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LinearFit {
+    /// In [0, 1].
+    pub share: f64,
+    /// W/m² per channel.
+    pub even: Rgb,
+}
+
+impl LinearFit {
+    /// By the points that were `measured` and count, without the tail; none if there is no light.
+    fn new(measured: &Verification, measure: Measure) -> Option<LinearFit> {
+        let floor = measure.floor * measured.mean_reflected;
+        let points = measured.points.iter().filter(|point| !point.hidden).map(|point| {
+            let size = point.measured.length().max(floor);
+            ((1.0 - point.tail) / (size * size), point.solution, point.measured)
+        });
+        let points: Vec<(f64, Rgb, Rgb)> = points.collect();
+        let weights: f64 = points.iter().map(|&(weight, ..)| weight).sum();
+        let mean = |of: fn(&(f64, Rgb, Rgb)) -> Rgb| {
+            points.iter().map(|point| point.0 * of(point)).sum::<Rgb>() / weights
+        };
+        let (solution, truth) = (mean(|point| point.1), mean(|point| point.2));
+        let (mut common, mut own) = (0.0, 0.0);
+        for (weight, s, t) in points {
+            common += weight * (s - solution).dot(t - truth);
+            own += weight * (s - solution).length_squared();
+        }
+        let share = if own > 0.0 { (common / own).clamp(0.0, 1.0) } else { 1.0 };
+        let even = (truth - share * solution).max(Rgb::ZERO);
+        even.is_finite().then_some(LinearFit { share, even })
+    }
 }
 
 impl<'a> Validator<'a> {
     /// For results of `scene`, with more points where `each_group` is to meet the target.
     pub fn new(scene: &'a Scene, measure: Measure, each_group: bool) -> Validator<'a> {
-        Validator { scene, measure, each_group, verifier: None }
+        Validator { scene, measure, each_group, verifier: None, at_once: None }
     }
 
     /// The `estimated` error of `light`, clamped to a measurement by as many paths as it takes to
@@ -105,22 +142,28 @@ impl<'a> Validator<'a> {
     }
 
     /// The `estimated` error of `light` with the whole as it is measured at a few points at once,
-    /// plus a standard error; unchanged where nothing can be measured.
+    /// plus a standard error, and the best fit to the truth there; unchanged where nothing can be
+    /// measured.
     pub fn measured_at_once(
-        &self,
+        &mut self,
         mut estimated: EstimatedError,
         light: &GatheredMesh,
-    ) -> EstimatedError {
+    ) -> (EstimatedError, Option<LinearFit>) {
         let settings = Settings { points_per_group: 0, ..self.settings() };
-        let measured = Verifier::starting_with(self.scene, settings, POINTS_AT_ONCE, 0)
-            .and_then(|mut verifier| verifier.measure_once(PATHS_AT_ONCE, light));
+        let verifier = match self.at_once.take() {
+            Some(verifier) => Ok(verifier),
+            None => Verifier::starting_with(self.scene, settings, POINTS_AT_ONCE, 0),
+        };
+        let measured = verifier
+            .and_then(|verifier| self.at_once.insert(verifier).measure_once(PATHS_AT_ONCE, light));
         match measured {
             Ok(measured) if measured.mean_reflected > negligible_reflection(self.scene) => {
                 // The measurement decides.
                 estimated.whole.uncertainty = f64::INFINITY;
-                clamp_to_measurement(estimated, &measured)
+                let fit = LinearFit::new(&measured, self.measure);
+                (clamp_to_measurement(estimated, &measured), fit)
             }
-            _ => estimated,
+            _ => (estimated, None),
         }
     }
 

@@ -178,6 +178,12 @@ impl<'a> AdaptiveGather<'a> {
         self.scale.radiosity_floor = floor;
     }
 
+    /// Leaves a `share` of all light; none, and all as it was, where direct light is kept apart.
+    pub fn scale_light(&mut self, share: f64) -> Option<()> {
+        let values = &mut self.samples.reflected;
+        self.samples.direct.is_empty().then(|| values.iter_mut().for_each(|value| *value *= share))
+    }
+
     /// Adds the same irradiance at all vertices, by which they reflect this radiosity on average,
     /// W/m² per channel.
     pub fn add_even_light(&mut self, reflected: Rgb) {
