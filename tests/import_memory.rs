@@ -71,9 +71,10 @@ fn textures(
     })
 }
 
-/// A texel of a texture: three bytes, and a third of a mean, which has twelve.
+/// A texel of a texture: three bytes, a third of a mean, which has twelve, and four thirds of a
+/// sixteenth of a sum, which has 24.
 #[cfg(feature = "textures")]
-const TEXEL: usize = 3 + 12 / 3;
+const TEXEL: usize = 3 + 4 + 2;
 
 /// Images of [`SIDE`] × [`SIDE`] texels that a scene may have.
 #[cfg(feature = "textures")]

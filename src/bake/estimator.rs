@@ -15,6 +15,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::accuracy::Measure;
+use crate::accuracy::hidden::LitRegion;
 use crate::accuracy::tail::Ranking;
 use crate::bake::controller::TargetErrors;
 use crate::bake::error_estimate::{
@@ -66,8 +67,8 @@ pub(super) struct ErrorEstimator<'a> {
     pub bounces: f64,
     /// Which errors count.
     pub measure: Measure,
-    /// Diagonal of where the light is, scene unit.
-    pub diagonal: f64,
+    /// Where the light is.
+    pub region: LitRegion,
     /// Over which points are spread.
     pub octaves: &'a Octaves,
     /// Reflected radiosity below which errors are relative to this instead, W/m²; replaced by that
@@ -514,7 +515,7 @@ impl Sample {
                 self.point.point.normal,
                 estimator.light.mesh.scene().sky(),
             )
-            .is_hidden(estimator.diagonal),
+            .is_hidden(&estimator.region, self.point.point.position),
             escaped: first.escaped,
         }
     }

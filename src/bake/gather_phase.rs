@@ -336,7 +336,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             bounces: self.state.bounces(),
             measure: self.measure,
-            diagonal: self.diagonal(),
+            region: self.solve.lit_region(self.shot.mesh.scene()),
             octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
             paths: Some(&self.paths),
@@ -390,8 +390,11 @@ impl<'a> GatherPhase<'a> {
                 && let Some(fit) = fit
                 && let Some(light) = self.fitted(fit)
             {
-                let (error, _) = self.validator.measured_at_once(best.error.clone(), &light);
+                let (mut error, _) = self.validator.measured_at_once(best.error.clone(), &light);
                 if error.whole.total < best.error.whole.total {
+                    // As other vertices have it, of an error that is the same share everywhere.
+                    let of_vertex = |b: &Rgb| 2.0 * error.whole.total * b.length();
+                    error.vertices = light.surface.radiosity.iter().map(of_vertex).collect();
                     best = Estimated { light, error, ..best };
                 }
             }
@@ -438,7 +441,7 @@ impl<'a> GatherPhase<'a> {
             ledger: &self.shot.solution.ledger,
             bounces: 0.0,
             measure: self.measure,
-            diagonal: self.diagonal(),
+            region: self.solve.lit_region(self.shot.mesh.scene()),
             octaves: &self.octaves,
             expected_floor: self.state.radiosity_floor(),
             paths: None,
@@ -502,11 +505,6 @@ impl<'a> GatherPhase<'a> {
     fn settings(&self, gather: GatherSettings) -> BakeSettings {
         let (solve, measure) = (self.solve.clone(), self.measure);
         BakeSettings { solve, gather: Some(gather), measure }
-    }
-
-    /// Diagonal of where the light is, scene unit.
-    fn diagonal(&self) -> f64 {
-        self.solve.light_diagonal(self.shot.mesh.scene())
     }
 
     fn into_result(self, estimated: Estimated, outcome: Outcome) -> BakedLight {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::accuracy::Measure;
+use crate::accuracy::hidden::LitRegion;
 use crate::bake::light_survey::LightSurvey;
 use crate::bake::model;
 use crate::error::Error;
@@ -100,10 +101,9 @@ impl SolveSettings {
 }
 
 impl SolveSettings {
-    /// Diagonal of where the light is or, where that is not known, of all surfaces that reflect;
-    /// scene unit.
-    pub(crate) fn light_diagonal(&self, scene: &Scene) -> f64 {
-        self.region.map_or_else(|| scene.reflecting_bounds().diagonal(), |region| region.diagonal())
+    /// Where the light of `scene` is.
+    pub(crate) fn lit_region(&self, scene: &Scene) -> LitRegion {
+        LitRegion::new(self.region, || scene.reflecting_bounds())
     }
 
     /// How large elements may be: `size` where the light is. What is black neither receives nor, if
@@ -168,7 +168,7 @@ impl BakeSettings {
     /// Lengths on each group as shares of its own diagonal, where that is smaller than that of
     /// where the light is: for an `error` that every group is to meet.
     pub(super) fn scale_groups(&mut self, error: f64, scene: &Scene) {
-        let diagonal = self.solve.light_diagonal(scene);
+        let diagonal = self.solve.lit_region(scene).diagonal;
         let mut bounds = vec![Aabb::EMPTY; scene.groups().len()];
         for (t, triangle) in scene.triangles().iter().enumerate() {
             let bounds = &mut bounds[triangle.group as usize];

@@ -171,7 +171,7 @@ pub(super) fn estimate_elements(
         ledger: &shot.solution.ledger,
         bounces: 0.0,
         measure: settings.measure,
-        diagonal: settings.solve.light_diagonal(shot.mesh.scene()),
+        region: settings.solve.lit_region(shot.mesh.scene()),
         octaves: &octaves_of(shot.mesh.scene()),
         expected_floor: light.radiosity_field().radiosity_floor(settings.measure.floor),
         paths: None,

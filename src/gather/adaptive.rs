@@ -518,7 +518,7 @@ impl<'a> AdaptiveGather<'a> {
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
                 let mut values = VertexValues { reflected, noise, buried, hidden, direct };
-                batch.apply(&points, attempt, self.scale.diagonal, light, &mut values);
+                batch.apply(&points, attempt, &self.scale.region, light, &mut values);
                 self.gather_count += batch.vertices.len() as u64;
                 let report = Progress {
                     pass: self.pass,

@@ -6,6 +6,7 @@ use super::directional_light::{Direct, DirectionalLight};
 use super::gather_points::VertexGatherPoints;
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::{Gather, IrradianceSample, RadiosityField};
+use crate::accuracy::hidden::LitRegion;
 use crate::error::Error;
 use crate::scene::Rgb;
 
@@ -48,13 +49,12 @@ impl Batch<'_> {
     }
 
     /// Writes the samples of this `attempt` to the values of the vertices that it resolves, and the
-    /// part of them that comes from `light` apart. The region of the light has this `diagonal`,
-    /// scene unit.
+    /// part of them that comes from `light` apart. The light is in `region`.
     pub fn apply(
         &self,
         points: &VertexGatherPoints,
         attempt: usize,
-        diagonal: f64,
+        region: &LitRegion,
         light: Option<&DirectionalLight>,
         values: &mut VertexValues,
     ) {
@@ -66,7 +66,7 @@ impl Batch<'_> {
             // (ρ + τ) E, which is darkness at a buried vertex.
             let albedo = points.albedo(v);
             let noise = reflected_noise(albedo, sample);
-            let is_hidden = points.outlook(v, sample).is_hidden(diagonal);
+            let is_hidden = points.outlook(v, sample).is_hidden(region, points.position(v));
             let direct = match light {
                 Some(light) if !is_buried => {
                     light.reflected(albedo, &points.point(v, attempt), sample.directional)

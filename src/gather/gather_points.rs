@@ -111,6 +111,11 @@ impl<'a> VertexGatherPoints<'a> {
         attempt + 1 < around.div_ceil(around.div_ceil(MAX_ATTEMPTS))
     }
 
+    /// Position of vertex `v`.
+    pub fn position(&self, v: u32) -> DVec3 {
+        self.vertices.positions[v as usize]
+    }
+
     /// What vertex `v` sees by `sample`.
     pub fn outlook(&self, v: u32, sample: &IrradianceSample) -> Outlook {
         outlook([sample; 2], self.normal(v), self.mesh.scene().sky())

@@ -24,6 +24,7 @@ use super::RadiosityField;
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::SampledMesh;
 use super::surplus::{HierarchicalSurplus, NodeValue, beyond_noise};
+use crate::accuracy::hidden::LitRegion;
 use crate::accuracy::{Measure, hidden};
 use crate::mesh::sizing::size_growth;
 use crate::mesh::{Mesh, NodeId};
@@ -58,12 +59,10 @@ pub(super) const UNKNOWN: f64 = f64::INFINITY;
 pub(crate) struct ErrorScale {
     /// Radiosity below which errors are relative to this, W/m²: a length over the channels.
     pub radiosity_floor: f64,
-    /// Diagonal of where the light is, scene unit.
-    pub diagonal: f64,
+    /// Where the light is: elements grow with the distance from its bounds.
+    pub region: LitRegion,
     /// Share of the area, where errors are largest, that is not refined.
     pub tail: f64,
-    /// The region of the light: elements grow with the distance from it.
-    region: Option<Aabb>,
 }
 
 impl ErrorScale {
@@ -75,18 +74,16 @@ impl ErrorScale {
         region: Option<Aabb>,
         measure: Measure,
     ) -> ErrorScale {
-        let diagonal = region.unwrap_or_else(|| mesh.scene().reflecting_bounds()).diagonal();
         ErrorScale {
-            diagonal,
+            region: LitRegion::new(region, || mesh.scene().reflecting_bounds()),
             radiosity_floor: field.radiosity_floor(measure.floor),
             tail: measure.tail,
-            region,
         }
     }
 
     /// Distance up to which surfaces touch, scene unit.
     pub fn touching(&self) -> f64 {
-        hidden::NEAR * self.diagonal
+        hidden::NEAR * self.region.diagonal
     }
 
     /// Whether `node` of `mesh` is further from the light than its diagonal.
@@ -96,7 +93,7 @@ impl ErrorScale {
 
     /// By how much larger elements are where `node` of `mesh` is.
     pub fn growth(&self, mesh: &Mesh, node: NodeId) -> f64 {
-        self.region.map_or(1.0, |region| size_growth(Some(&region), &mesh.corners(node)))
+        size_growth(self.region.bounds.as_ref(), &mesh.corners(node))
     }
 }
 

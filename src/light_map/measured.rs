@@ -24,6 +24,7 @@ use crate::accuracy::{Estimate, Measure};
 use crate::backend::Backend;
 use crate::bake::BakeResult;
 use crate::error::Error;
+use crate::gather::GatherPoint;
 use crate::gather::gather_points::{SurfaceOffset, outlook};
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::geometry::barycentric::barycentric;
@@ -65,7 +66,7 @@ impl LightMap {
         let mut gatherer = gatherer(baked, backend)?;
         let field = baked.light.radiosity_field();
         let scene = self.atlas.scene();
-        let (diagonal, sky) = (baked.settings.solve.light_diagonal(scene), scene.sky());
+        let (region, sky) = (baked.settings.solve.lit_region(scene), scene.sky());
         let mut errors = vec![];
         let order = golden_ratio_order(points.len());
         let (mut remaining, mut batches) = (&order[..], BatchSizer::new(64));
@@ -80,8 +81,8 @@ impl LightMap {
                 for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
                     let ShownPoint { albedo, shown, area, .. } = points[k];
                     let pair = [first, second];
-                    let normal = points[k].points[0].point.normal;
-                    if !outlook(pair, normal, sky).is_hidden(diagonal) {
+                    let GatherPoint { position, normal, .. } = points[k].points[0].point;
+                    if !outlook(pair, normal, sky).is_hidden(&region, position) {
                         let gathered = pair.map(|sample| albedo * sample.irradiance);
                         errors.push(TexelError { shown, gathered, area });
                     }

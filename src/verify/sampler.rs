@@ -11,7 +11,7 @@ use super::statistics::{PARTS, Sample};
 use super::surfaces::ReflectingGroup;
 use super::verification::{GroupError, PointError, Stop, Verification};
 use crate::accuracy::Estimate;
-use crate::accuracy::hidden::{Outlook, PATHS_IN_THE_DARK};
+use crate::accuracy::hidden::{LitRegion, Outlook, PATHS_IN_THE_DARK};
 use crate::accuracy::mean_square::{MeanSquare, MeasuredPoint, TrimmedSquare};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::light::{PathTracer, SurfacePoint};
@@ -195,26 +195,27 @@ impl<'a> Sampler<'a> {
             }
         }
         self.paths = paths;
-        let diagonal = self.lit_diagonal();
+        let region = self.lit_region();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {
             let dark = point.sample().measured() == Rgb::ZERO && point.paths >= PATHS_IN_THE_DARK;
             let all = point.sample().measured().length();
             let lamps = if all > 0.0 { point.from_lamps.length() / all } else { 0.0 };
-            point.hidden = Outlook { dark, lamps, ..point.outlook }.is_hidden(diagonal);
+            let outlook = Outlook { dark, lamps, ..point.outlook };
+            point.hidden = outlook.is_hidden(&region, point.point.position);
         }
         ControlFlow::Continue(())
     }
 
-    /// Diagonal of where the light is: what is near or narrow is so beside a lit room, and not
-    /// beside the wide plane that the room stands on; scene unit.
-    fn lit_diagonal(&self) -> f64 {
+    /// Where the light is: what is near or narrow is so beside a lit room, and not beside the wide
+    /// plane that the room stands on.
+    fn lit_region(&self) -> LitRegion {
         let points = self.strata.iter().flat_map(|s| {
             let flux = |p: &TracedPoint| s.area_of(p) * p.sample().measured().length();
             s.points.iter().map(move |p| (p.point.position, flux(p)))
         });
-        let whole = self.scene.reflecting_bounds().diagonal();
-        let lit = Aabb::concentrated(&points.collect::<Vec<_>>(), whole);
-        lit.map_or(whole, |lit| lit.diagonal())
+        let all = self.scene.reflecting_bounds();
+        let lit = Aabb::concentrated(&points.collect::<Vec<_>>(), all.diagonal());
+        LitRegion::new(lit, || all)
     }
 
     /// All points, with the groups that they are of.

@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::accuracy::hidden::LitRegion;
 use crate::mesh::Mesh;
 use crate::scene::{Material, Triangle};
 use crate::verify::octaves_of;
@@ -40,7 +41,7 @@ fn samples_on_ground(light: &GatheredMesh, element_residual: &[f64], floor: f64)
         ledger: &Ledger::default(),
         bounces: 0.0,
         measure: Measure::default(),
-        diagonal: 1.0,
+        region: LitRegion { bounds: None, diagonal: 1.0 },
         octaves: &octaves_of(light.mesh.scene()),
         expected_floor: 0.0,
         paths: None,

@@ -6,7 +6,7 @@
 //!   ┌───┬───┬───┬───┐     Cells are squares of one colour, so that F is linear along x in each,
 //!   │   │  ╱│   │   │     and the integral over the part of a side within a cell is F at its
 //!   ├───┼─╱─┼───┼───┤     middle times dy. F is a sum over the cells of a row to the left, kept
-//!   │   │╱  │   │   │     for every eighth of them.
+//!   │   │╱  │   │   │     for every sixteenth of them.
 //!   └───┴───┴───┴───┘
 //! ```
 //!
@@ -18,8 +18,8 @@ use glam::DVec2;
 use super::Texture;
 use crate::scene::Rgb;
 
-/// Cells per kept sum: three bytes for each texel, as the image itself has. Plain choice.
-const BLOCK: usize = 8;
+/// Cells per kept sum: two bytes for each texel, with those of coarser levels. Plain choice.
+const BLOCK: usize = 16;
 
 /// Sums over the cells of each row, in columns of texels.
 pub(super) struct RowSums {
