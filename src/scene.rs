@@ -111,8 +111,8 @@ pub struct Scene {
     derived: Derived,
 }
 
-/// What follows from the corners and holes of triangles and from which materials are clear, whatever
-/// else a scene has; computed on first use.
+/// What follows from the corners and holes of triangles and from which materials are clear,
+/// whatever else a scene has; computed on first use.
 #[derive(Debug, Default)]
 struct Shape {
     /// See [`Scene::is_back_covered`].

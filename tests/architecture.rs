@@ -13,7 +13,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("linear", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
-    ("accuracy", "error"),
+    ("accuracy", "error geometry"),
     ("visibility", "error geometry sampling scene"),
     ("light", "error geometry progress sampling scene visibility"),
     ("glare", "error geometry light sampling scene"),

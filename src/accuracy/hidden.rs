@@ -7,7 +7,8 @@
 //! | share of backs, no light arrives | 0.05 | enclosed: no lit point sees it either |
 //! | share of backs nearer than [`NEAR`] | 0.4 | covered by what stands on it |
 //! | mean of 1/distance | 10⁴ | in a crack |
-//! | share of surfaces; of lamps in the light, where that mostly is | 0.01 | in the open: sky and sun are exact |
+//! | share of surfaces, and of lamps in the light | 0.01 | in the open: sky and sun are exact |
+//! | the same, of any lamps, outside the region of the light | 0.01 | their light is faint there |
 //!
 //! At the foot of an inverted wall the share of backs is 0.5; 0.4 is two standard deviations of 128
 //! rays less. Between parallel plates the mean of 1/distance is 2/3 over their distance: in a room

@@ -269,8 +269,8 @@ impl<'a> GatherPhase<'a> {
         }
     }
 
-    /// All vertices gather what is emitted and exchange it, by few rays, and once more by as many as
-    /// the time permits. The step that follows, unless stopped: all passes, where they take less
+    /// All vertices gather what is emitted and exchange it, by few rays, and once more by as many
+    /// as the time permits. The step that follows, unless stopped: all passes, where they take less
     /// than half of the time that is left, else elements are split by few rays.
     fn first_light(
         &mut self,
@@ -421,9 +421,9 @@ impl<'a> GatherPhase<'a> {
         Estimated { light, error, cancelled }
     }
 
-    /// What was gathered, by a `fit` to the truth: of noise in the dark, which is more than all light
-    /// there, little is left, and an even light in its place. None where light comes from points, as
-    /// the sun, which is reconstructed apart.
+    /// What was gathered, by a `fit` to the truth: of noise in the dark, which is more than all
+    /// light there, little is left, and an even light in its place. None where light comes from
+    /// points, as that of the sun, which is reconstructed apart.
     fn fitted(&mut self, LinearFit { share, even }: LinearFit) -> Option<GatheredMesh> {
         self.state.scale_light(share)?;
         self.state.add_even_light(even);

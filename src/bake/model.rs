@@ -106,8 +106,8 @@ pub(super) fn min_rays(vertices: usize) -> f64 {
 /// which it is known better before elements are split. Plain choice.
 pub(super) const RAYS_OF_FIRST_LIGHT: [u32; 2] = [4, 16];
 
-/// Rays of a vertex where elements are split before there is time for as many as its noise asks for.
-/// Of three scenes in 2, 5 and 10 s, 16 and 32 led to the same errors, within 20 %.
+/// Rays of a vertex where elements are split before there is time for as many as its noise asks
+/// for. Of three scenes in 2, 5 and 10 s, 16 and 32 led to the same errors, within 20 %.
 pub(super) const RAYS_IN_HASTE: u32 = 32;
 
 /// Minimum number of rays of a gather that only lights the next one. With 16 a city of 18 454

@@ -38,8 +38,8 @@ const SIGMAS_PER_GROUP: f64 = 3.0;
 /// Minimum of the limits of paths per measurement.
 pub(super) const MIN_PATHS: u64 = 1 << 18;
 
-/// Points of a measurement where the time is over, and the paths over all of them: some 0.1 s on two
-/// cores, which leave the error of an even light uncertain by a tenth of itself. Plain choice.
+/// Points of a measurement where the time is over, and the paths over all of them: some 0.1 s on
+/// two cores, which leave the error of an even light uncertain by a tenth of itself. Plain choice.
 const POINTS_AT_ONCE: usize = 256;
 const PATHS_AT_ONCE: usize = 1 << 15;
 

@@ -184,9 +184,14 @@ impl<'a> PathTracer<'a> {
         (0..paths).map(|_| self.path(point, rng)).sum()
     }
 
-    /// Reflected radiosity at `point` by the light that lamps and luminaires send it directly, by as
-    /// many `samples`, W/m². Where a ray can meet a lamp, some of its light is missing.
-    pub(crate) fn from_lamps(&self, point: &SurfacePoint, samples: usize, rng: &mut Rng) -> Rgb {
+    /// Reflected radiosity at `point` by the light that lamps and luminaires send it directly, by
+    /// as many `samples`, W/m². Where a ray can meet a lamp, some of its light is missing.
+    pub(crate) fn light_of_lamps(
+        &self,
+        point: &SurfacePoint,
+        samples: usize,
+        rng: &mut Rng,
+    ) -> Rgb {
         let mut reflected = Rgb::ZERO;
         for _ in 0..samples {
             let (at, throughput) = self.start(point, rng);

@@ -7,8 +7,8 @@
 //!   └──────► u
 //! ```
 //!
-//! A mean takes texels as squares of one colour ([`triangle_mean`]). A look-up interpolates linearly
-//! between the centres of texels, for pictures.
+//! A mean takes texels as squares of one colour. A look-up interpolates linearly between the
+//! centres of texels, for pictures.
 
 mod triangle_mean;
 
@@ -55,7 +55,8 @@ impl Texture {
         }
         let sums = |level: usize| {
             let cell = |x, y| texture.cell(level, x, y);
-            RowSums::new(texture.level_size(level), 2f64.powi(level as i32), cell)
+            let (texels, cells) = (texture.size(), texture.level_size(level));
+            RowSums::new(texels, cells, 2f64.powi(level as i32), cell)
         };
         texture.row_sums = (0..=texture.levels.len()).map(sums).collect();
         Some(texture)
@@ -147,12 +148,13 @@ impl Texture {
         let level = (outline / cells).log2().max(0.0).min(self.levels.len() as f64) as usize;
         // Twice that of a square with this outline, if cells are not larger than the image.
         let crossings = 4.0 * cells;
-        self.mean_of_triangle(corners.map(in_texels), clamped, level, crossings).unwrap_or_else(
-            || match outline / size.min_element() > cells {
-                true => self.whole_mean(),
-                false => self.sampled_mean(corners, clamped),
-            },
-        )
+        let cell = |x, y| self.cell(level, x, y);
+        let sums = &self.row_sums[level];
+        match sums.mean(corners.map(in_texels), clamped, crossings, cell) {
+            Some(mean) => mean,
+            None if outline / size.min_element() > cells => self.whole_mean(),
+            None => self.sampled_mean(corners, clamped),
+        }
     }
 
     /// The mean of points spread evenly over a triangle.

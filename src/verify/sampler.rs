@@ -54,7 +54,7 @@ struct TracedPoint {
     solution: Option<Rgb>,
     /// Known with the first paths, as is whether the point is hidden.
     outlook: Outlook,
-    /// Reflected radiosity by direct light of lamps and luminaires, known with the first paths where
+    /// Reflected radiosity by direct light of lamps and luminaires, known with the first paths if
     /// the point may be in the open, W/m².
     from_lamps: Rgb,
     hidden: bool,
@@ -235,7 +235,7 @@ impl<'a> Sampler<'a> {
             let mut rng = random_numbers(&[self.settings.seed, group as u64, index, 0]);
             traced.outlook = outlook(&self.tracer, &point.point, &mut rng);
             if traced.outlook.is_open() {
-                traced.from_lamps = self.tracer.from_lamps(&point.point, 64, &mut rng);
+                traced.from_lamps = self.tracer.light_of_lamps(&point.point, 64, &mut rng);
             }
         }
         traced.paths = paths;

@@ -15,14 +15,19 @@
 
 use glam::DVec2;
 
-use super::Texture;
-use crate::scene::Rgb;
+use crate::scene::rgb::Rgb;
 
 /// Cells per kept sum: two bytes for each texel, with those of coarser levels. Plain choice.
 const BLOCK: usize = 16;
 
-/// Sums over the cells of each row, in columns of texels.
+/// Sums over the cells of each row of an image, in columns of texels.
 pub(super) struct RowSums {
+    /// Cells along a row, and rows.
+    cells: [u32; 2],
+    /// Texels along u and v.
+    texels: [u32; 2],
+    /// Texels across a cell; the last one may be narrower.
+    cell_width: f64,
     blocks_per_row: usize,
     /// For each block of a row, the sum over all cells before it.
     before: Vec<[f64; 3]>,
@@ -38,24 +43,6 @@ struct Axis {
     cells: u32,
     /// Whether the border goes on beyond the image, which else repeats.
     clamped: bool,
-}
-
-impl RowSums {
-    /// Of `rows` rows of `columns` cells, each `width` texels wide but for the last.
-    pub fn new([columns, rows]: [u32; 2], width: f64, cell: impl Fn(u32, u32) -> Rgb) -> RowSums {
-        let blocks_per_row = (columns as usize).div_ceil(BLOCK);
-        let mut before = Vec::with_capacity(blocks_per_row * rows as usize);
-        for y in 0..rows {
-            let mut sum = Rgb::ZERO;
-            for x in 0..columns {
-                if x as usize % BLOCK == 0 {
-                    before.push((width * sum).to_array());
-                }
-                sum += cell(x, y);
-            }
-        }
-        RowSums { blocks_per_row, before }
-    }
 }
 
 impl Axis {
@@ -97,26 +84,52 @@ impl Axis {
     }
 }
 
-impl Texture {
-    /// Mean over the triangle with these `corners` in texels, rows from the top, by cells of
-    /// `level`; none where it is thinner than rounding, or where its sides cross more than
-    /// `crossings` cells.
-    pub(super) fn mean_of_triangle(
+impl RowSums {
+    /// Of an image of this many `texels`, in this many `cells` that are `cell_width` texels wide,
+    /// each of the colour that `cell` has for a column and a row.
+    pub fn new(
+        texels: [u32; 2],
+        cells: [u32; 2],
+        cell_width: f64,
+        cell: impl Fn(u32, u32) -> Rgb,
+    ) -> RowSums {
+        let [columns, rows] = cells;
+        let blocks_per_row = (columns as usize).div_ceil(BLOCK);
+        let mut before = Vec::with_capacity(blocks_per_row * rows as usize);
+        for y in 0..rows {
+            let mut sum = Rgb::ZERO;
+            for x in 0..columns {
+                if (x as usize).is_multiple_of(BLOCK) {
+                    before.push((cell_width * sum).to_array());
+                }
+                sum += cell(x, y);
+            }
+        }
+        RowSums { cells, texels, cell_width, blocks_per_row, before }
+    }
+
+    /// Mean over the triangle with these `corners` in texels, rows from the top; `cell` as it was
+    /// for the sums. None where the triangle is thinner than rounding, or where its sides cross
+    /// more than `crossings` cells.
+    pub fn mean(
         &self,
         corners: [DVec2; 3],
         clamped: bool,
-        level: usize,
         crossings: f64,
+        cell: impl Fn(u32, u32) -> Rgb,
     ) -> Option<Rgb> {
-        let [columns, rows] = self.level_size(level);
-        let cell = 2f64.powi(level as i32);
-        let axis = |extent: u32, cells| Axis { extent: extent.into(), cell, cells, clamped };
-        let axes = [axis(self.width, columns), axis(self.height, rows)];
+        let axis = |k: usize| Axis {
+            extent: self.texels[k].into(),
+            cell: self.cell_width,
+            cells: self.cells[k],
+            clamped,
+        };
+        let axes = [axis(0), axis(1)];
         let cell_of = |p: DVec2| [axes[0].cell_at(p.x), axes[1].cell_at(p.y)];
         let [a, b, c] = corners;
         if cell_of(a) == cell_of(b) && cell_of(b) == cell_of(c) {
             let [(_, column), (_, row)] = cell_of(a);
-            return Some(self.cell(level, column, row));
+            return Some(cell(column, row));
         }
         let sides = [(a, b), (b, c), (c, a)];
         let crossed = |&(p, q): &(DVec2, DVec2)| {
@@ -131,12 +144,18 @@ impl Texture {
         if is_thin || sides.iter().map(crossed).sum::<f64>() > crossings {
             return None;
         }
-        let integral: Rgb = sides.into_iter().map(|(p, q)| self.integral(p, q, axes, level)).sum();
+        let integral: Rgb = sides.into_iter().map(|(p, q)| self.integral(p, q, axes, &cell)).sum();
         Some((integral / area).max(Rgb::ZERO))
     }
 
     /// ∫ F dy along the straight line from `p` to `q`, texels.
-    fn integral(&self, p: DVec2, q: DVec2, [across, down]: [Axis; 2], level: usize) -> Rgb {
+    fn integral(
+        &self,
+        p: DVec2,
+        q: DVec2,
+        [across, down]: [Axis; 2],
+        cell: &impl Fn(u32, u32) -> Rgb,
+    ) -> Rgb {
         if p.y == q.y {
             return Rgb::ZERO;
         }
@@ -153,7 +172,7 @@ impl Texture {
             for end in across.borders(left, right).chain([right]) {
                 let share = if width > 0.0 { (end - start) / width } else { 1.0 };
                 let middle = 0.5 * (start + end);
-                sum += share * (to.y - from.y) * self.row_integral(middle, row, across, level);
+                sum += share * (to.y - from.y) * self.row_integral(middle, row, across, cell);
                 start = end;
             }
             from = to;
@@ -162,28 +181,24 @@ impl Texture {
     }
 
     /// F: the integral along `row` from 0 to `x`, texels.
-    fn row_integral(&self, x: f64, row: u32, across: Axis, level: usize) -> Rgb {
+    fn row_integral(&self, x: f64, row: u32, across: Axis, cell: &impl Fn(u32, u32) -> Rgb) -> Rgb {
         let (repetition, column) = across.cell_at(x);
         let (start, last) = (f64::from(column) * across.cell, across.cells - 1);
         let within = x - repetition * across.extent - start;
-        let here = self.sum_before(column, row, across.cell, level);
-        let integral = here + within * self.cell(level, column, row);
+        let integral = self.sum_before(column, row, cell) + within * cell(column, row);
         if repetition == 0.0 {
             return integral;
         }
         let rest = across.extent - f64::from(last) * across.cell;
-        let whole =
-            self.sum_before(last, row, across.cell, level) + rest * self.cell(level, last, row);
-        integral + repetition * whole
+        integral + repetition * (self.sum_before(last, row, cell) + rest * cell(last, row))
     }
 
     /// The sum over the cells of `row` before `column`, in columns of texels.
-    fn sum_before(&self, column: u32, row: u32, cell: f64, level: usize) -> Rgb {
-        let sums = &self.row_sums[level];
+    fn sum_before(&self, column: u32, row: u32, cell: &impl Fn(u32, u32) -> Rgb) -> Rgb {
         let block = column as usize / BLOCK;
         let first = (block * BLOCK) as u32;
-        let rest: Rgb = (first..column).map(|x| self.cell(level, x, row)).sum();
-        Rgb::from(sums.before[row as usize * sums.blocks_per_row + block]) + cell * rest
+        let rest: Rgb = (first..column).map(|x| cell(x, row)).sum();
+        Rgb::from(self.before[row as usize * self.blocks_per_row + block]) + self.cell_width * rest
     }
 }
 
