@@ -90,8 +90,7 @@ mod tests {
 
     #[test]
     fn each_condition_hides_by_itself() {
-        let seen = Outlook { covered: 1.0, inverse_distance: 2.0, ..Outlook::default() };
-        let room = seen;
+        let room = Outlook { covered: 1.0, inverse_distance: 2.0, ..Outlook::default() };
         let chamber = Outlook { backs: 0.3, ..room };
         let foot = Outlook { backs: 0.5, ..room };
         for (outlook, hidden) in [

@@ -14,7 +14,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::accuracy::Measure;
 use crate::backend::cpu::RayGather;
@@ -276,7 +276,7 @@ impl<'a> GatherPhase<'a> {
         &mut self,
         progress: &mut dyn FnMut(&GatherProgress) -> ControlFlow<()>,
     ) -> Result<Option<Step>, Error> {
-        let left = |target: Option<ErrorTarget>| target.map_or(Duration::MAX, |t| t.time_left());
+        let Some(target) = self.target else { return Ok(Some(Step::AllPasses)) };
         let [least, most] = model::RAYS_OF_FIRST_LIGHT;
         let start = Instant::now();
         if self.exchange_by(least, progress)? == StopReason::Cancelled {
@@ -288,7 +288,7 @@ impl<'a> GatherPhase<'a> {
         }
         // A ray of a vertex, and one of its row.
         let mut time_per_ray = start.elapsed() / least;
-        let rays = left(self.target).div_duration_f64(time_per_ray).min(most.into()) as u32;
+        let rays = target.time_left().div_duration_f64(time_per_ray).min(most.into()) as u32;
         if rays >= 2 * least {
             let start = Instant::now();
             if self.exchange_by(rays, progress)? == StopReason::Cancelled {
@@ -296,11 +296,11 @@ impl<'a> GatherPhase<'a> {
             }
             time_per_ray = start.elapsed() / rays;
         }
-        if time_per_ray * self.gather.rays < left(self.target) {
+        if time_per_ray * self.gather.rays < target.time_left() {
             return Ok(Some(Step::AllPasses));
         }
-        self.gather.rays = model::RAYS_IN_HASTE;
-        self.gatherer = self.gatherer(1)?;
+        let few = GatherSettings { rays: model::RAYS_IN_HASTE, ..self.gather.clone() };
+        self.step_to(few, target)?;
         Ok(Some(Step::Split))
     }
 

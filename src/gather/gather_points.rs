@@ -98,7 +98,7 @@ impl<'a> VertexGatherPoints<'a> {
         let around = self.around(v);
         let step = around.len().div_ceil(MAX_ATTEMPTS);
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
-        let position = self.vertices.positions[v as usize];
+        let position = self.position(v);
         let inset = (self.mesh.centroid(element) - position) * 0.02;
         let (normal, size) = (self.normal(v), self.size(v));
         let point = self.offset.gather_point(position + inset, normal, size);

@@ -36,21 +36,14 @@ impl Aabb {
     /// each axis; none if they have no weight or all coincide.
     pub fn around_most(points: &[(DVec3, f64)], share: f64) -> Option<Aabb> {
         let total: f64 = points.iter().map(|(_, weight)| weight).sum();
-        let first_within = |mut along: Box<dyn Iterator<Item = &(f64, f64)> + '_>| {
-            let mut outside = 0.0;
-            let first = along.find(|(_, weight)| {
-                outside += weight;
-                outside > share * total
-            });
-            first.map(|&(at, _)| at)
-        };
+        let allowed = share * total;
         let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
         for axis in 0..3 {
             let mut along: Vec<(f64, f64)> =
                 points.iter().map(|&(at, weight)| (at[axis], weight)).collect();
             along.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-            low[axis] = first_within(Box::new(along.iter()))?;
-            high[axis] = first_within(Box::new(along.iter().rev()))?;
+            low[axis] = first_beyond(allowed, along.iter())?;
+            high[axis] = first_beyond(allowed, along.iter().rev())?;
         }
         (total > 0.0 && low != high).then_some(Aabb { low, high })
     }
@@ -130,6 +123,16 @@ impl Aabb {
             DVec3::select(on_high_side, self.high, self.low)
         })
     }
+}
+
+/// Of coordinates with weights the first one at which the sum of the weights is above `allowed`.
+fn first_beyond<'p>(allowed: f64, mut along: impl Iterator<Item = &'p (f64, f64)>) -> Option<f64> {
+    let mut sum = 0.0;
+    let is_beyond = |&&(_, weight): &&(f64, f64)| {
+        sum += weight;
+        sum > allowed
+    };
+    along.find(is_beyond).map(|&(at, _)| at)
 }
 
 #[cfg(test)]
