@@ -15,7 +15,9 @@ use radiosity::backend::cpu::{RayGather, RayRows};
 use radiosity::backend::gpu::{HemicubeRows, TracedGather, TracedRows};
 use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::mesh::NodeId;
-use radiosity::{Error, FormFactors, Gather, Gpu, Material, Mesh, Rgb, Scene, Triangle, load_obj};
+use radiosity::{
+    Error, FormFactors, Gather, Gpu, Material, Mesh, Rgb, Scene, Triangle, load_scene,
+};
 
 /// Rays of a point over the hemisphere.
 const RAYS: u32 = 256;
@@ -40,7 +42,7 @@ fn main() -> Result<(), Error> {
         true => [32, 4_000, 128_000].map(|n| (format!("room of {n}"), room(n).into())).into(),
         false => paths
             .into_iter()
-            .map(|path| load_obj(&path).map(|scene| (path, scene.into())))
+            .map(|path| load_scene(&path).map(|scene| (path, scene.into())))
             .collect::<Result<_, Error>>()?,
     };
     println!("scene\ttriangles\twhat\tmaker\tsetting\ta second\tnote");

@@ -32,7 +32,7 @@ use radiosity::bake::{ErrorEstimate, GatherSettings};
 use radiosity::gather::GatherPoint;
 use radiosity::{
     Backend, BakeResult, BakeSettings, BakeTarget, Error, Gather, GatheredMesh, Rgb, Scene,
-    VertexMesh, load_obj,
+    VertexMesh, load_scene,
 };
 
 /// The error around whose settings others are varied.
@@ -61,13 +61,13 @@ fn main() -> Result<(), Error> {
     if only_rows {
         let scenes: Vec<_> = scenes
             .iter()
-            .map(|path| Ok(Arc::new(load_obj(path)?)))
+            .map(|path| Ok(Arc::new(load_scene(path)?)))
             .collect::<Result<_, Error>>()?;
         return row_cost::measure(&common::gpu(), &scenes);
     }
     for path in &scenes {
         let start = Instant::now();
-        let scene = Arc::new(load_obj(path)?);
+        let scene = Arc::new(load_scene(path)?);
         let name = Path::new(path).file_name().unwrap_or_default().display();
         println!("{name}: {} triangles, rays on the CPU", scene.triangles().len());
         println!("{:25} {:>10} {:>10}   measured", "law", "fitted", "model");

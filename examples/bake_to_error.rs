@@ -6,11 +6,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use radiosity::{Backend, BakeResult, BakeTarget, Error, load_obj, write_ply};
+use radiosity::{Backend, BakeResult, BakeTarget, Error, load_scene, write_ply};
 
 fn main() -> Result<(), Error> {
     let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = Arc::new(load_obj(std::env::args().nth(1).unwrap_or(scenes.into()))?);
+    let scene = Arc::new(load_scene(std::env::args().nth(1).unwrap_or(scenes.into()))?);
     for warning in scene.warnings() {
         eprintln!("{warning}"); // what was repaired or looks wrong
     }

@@ -6,10 +6,10 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use radiosity::{Backend, BakeTarget, Camera, Error, load_obj, write_exr, write_png};
+use radiosity::{Backend, BakeTarget, Camera, Error, load_scene, write_exr, write_png};
 
 fn main() -> Result<(), Error> {
-    let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
+    let scene = load_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
     let backend = Backend::gpu(None)?;
     // A coarse bake is enough: its error is seen only by way of a reflection.
     let baked = BakeTarget::Error(0.05).bake(scene, &backend, |_| ControlFlow::Continue(()))?;

@@ -7,10 +7,10 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::bake::BakeProgress;
-use radiosity::{Backend, BakeTarget, Camera, load_obj, write_exr, write_ply, write_png};
+use radiosity::{Backend, BakeTarget, Camera, load_scene, write_exr, write_ply, write_png};
 
 fn main() -> Result<(), radiosity::Error> {
-    let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
+    let scene = load_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
     let backend = Backend::gpu(None)?; // the best adapter; Backend::Cpu does without one
     eprintln!("baking on {}", backend.adapter().name);
     let baked = BakeTarget::Error(0.015).bake(scene, &backend, |stage| {

@@ -7,10 +7,10 @@ use std::ops::ControlFlow;
 use glam::{DAffine3, DVec3};
 use radiosity::backend::cpu::RayRows;
 use radiosity::solver::SolveSession;
-use radiosity::{Error, Mesh, Solver, load_obj};
+use radiosity::{Error, Mesh, Solver, load_scene};
 
 fn main() -> Result<(), Error> {
-    let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
+    let scene = load_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
     let mut materials = scene.materials().to_vec();
     for material in &mut materials {
         material.exitance *= 0.5;

@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 
 use radiosity::backend::gpu::GpuLimits;
-use radiosity::{Backend, BakeTarget, Gpu, load_obj};
+use radiosity::{Backend, BakeTarget, Gpu, load_scene};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Both are handles: the program keeps its own.
     let limits = GpuLimits { memory: 256 << 20, ..GpuLimits::NONE }; // leave the rest to others
     let gpu = Gpu::from_wgpu(device.clone(), queue.clone(), &limits)?;
-    let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
+    let scene = load_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj"))?;
     let target = BakeTarget::Error(0.05);
     let baked = target.bake(scene, &Backend::Gpu(gpu), |_| ControlFlow::Continue(()))?;
 

@@ -15,7 +15,7 @@ use radiosity::*;
 fn main() -> Result<(), Error> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
     // Elements with edges of at most 60 mm receive light; cut smaller where surfaces touch.
-    let mesh = Mesh::new(load_obj(path)?, 60.0)?.split_at_contacts(2);
+    let mesh = Mesh::new(load_scene(path)?, 60.0)?.split_at_contacts(2);
     println!("{} elements", mesh.element_count());
 
     // Form factors: hemicubes with 128 × 128 pixels on top, closed forms for receivers within one
@@ -34,7 +34,7 @@ fn main() -> Result<(), Error> {
 
     // The corners of coarse elements gather that light; elements are split where it is not linear.
     let light = GatheredMesh::from_elements(&mesh, &solution.radiosity)?;
-    let coarse = Mesh::new(load_obj(path)?, 150.0)?.split_at_contacts(2);
+    let coarse = Mesh::new(load_scene(path)?, 150.0)?.split_at_contacts(2);
     let mut gather = RayGather::new(&coarse, 1024)?; // or TracedGather, or your own `Gather`
     let refinement = RefinementSettings::new(5.0); // no element below 5 mm is split
     let go = |_: &_| ControlFlow::Continue(());

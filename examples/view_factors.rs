@@ -6,11 +6,11 @@
 use std::ops::ControlFlow;
 
 use radiosity::io::view_factors::write_csv_matrix;
-use radiosity::{Error, ViewFactors, load_obj};
+use radiosity::{Error, ViewFactors, load_scene};
 
 fn main() -> Result<(), Error> {
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = load_obj(std::env::args().nth(1).unwrap_or(default.into()))?;
+    let scene = load_scene(std::env::args().nth(1).unwrap_or(default.into()))?;
     let two_sided = []; // numbers of groups that give and take on both sides
     let matrix = ViewFactors::new(&scene, 1e-3, &two_sided, |done, of| {
         eprint!("\r{done} of {of} ");

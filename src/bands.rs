@@ -20,9 +20,9 @@
 //! ```
 //! # use std::ops::ControlFlow;
 //! # use radiosity::bands::{Band, BandMaterial, Bands};
-//! # use radiosity::{Backend, BakeTarget, Error, load_obj};
+//! # use radiosity::{Backend, BakeTarget, Error, load_scene};
 //! # fn main() -> Result<(), Error> {
-//! let scene = load_obj("scenes/cornell_box.obj")?;
+//! let scene = load_scene("scenes/cornell_box.obj")?;
 //! let go = |_: &_| ControlFlow::Continue(());
 //! let baked = BakeTarget::Error(0.3).bake(scene, &Backend::Cpu, go)?;
 //! let names = ["near", "far"].map(|name| Band { name: name.into(), wavelength: None });

@@ -3,7 +3,8 @@
 //!
 //! | format | function | content |
 //! |---|---|---|
-//! | Wavefront OBJ, MTL | [`load_obj`], [`read_obj`], [`ObjSettings`] | a scene |
+//! | glTF 2.0 (feature `glb`) | [`load_scene`], [`read_scene`], [`SceneSettings`] | a scene |
+//! | Wavefront OBJ, MTL | the same | a scene |
 //! | STL, ASCII and binary | the same, by the extension of the name | a scene without materials |
 //! | IESNA LM-63, EULUMDAT | [`PhotometrySettings`] | the light distribution of a luminaire |
 //! | EPW | [`read_epw`] | the weather of a year at a place |
@@ -19,8 +20,11 @@ mod epw;
 #[cfg(feature = "exr")]
 mod exr;
 mod files;
+mod given;
 #[cfg(feature = "glb")]
 mod glb;
+#[cfg(feature = "glb")]
+mod gltf;
 mod lights;
 mod masks;
 mod mtl;
@@ -35,6 +39,7 @@ mod ply_reader;
 mod png;
 #[cfg(all(feature = "exr", feature = "textures"))]
 mod radiance;
+mod settings;
 mod specular;
 mod stl;
 mod text;
@@ -56,19 +61,23 @@ pub use self::exr::{write_light_map_exr, write_light_map_radiosity};
 pub use self::glb::write_light_map_glb;
 #[cfg(feature = "glb")]
 pub use self::glb::{GlbSettings, write_glb};
+#[cfg(feature = "glb")]
+pub use self::gltf::{LampUnits, LitVertices, gltf_ending, read_cameras, write_lit_gltf};
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
 pub use epw::{Weather, WeatherRecord, epw_from_text, read_epw};
 pub use files::read_text;
 #[cfg(feature = "npz")]
 pub use npz::{npz_from_bytes, read_npz, write_npz};
-pub use obj::{ObjSettings, load_obj, read_obj};
 pub use photometry::{Photometry, PhotometrySettings, photometry_from_bytes, read_photometry};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_bands::write_ply_bands;
 pub use ply_reader::read_ply;
 #[cfg(all(feature = "exr", feature = "textures"))]
 pub use radiance::read_radiance;
+#[expect(deprecated, reason = "former names stay for one release")]
+pub use settings::{ObjSettings, load_obj, read_obj};
+pub use settings::{SceneSettings, load_scene, read_scene};
 pub use specular::SpecularSurfaces;
 pub use tone::ToneCurve;
 

@@ -9,11 +9,11 @@
 //! use std::ops::ControlFlow;
 //!
 //! use radiosity::bake::BakeProgress;
-//! use radiosity::{Backend, BakeTarget, load_obj, write_ply};
+//! use radiosity::{Backend, BakeTarget, load_scene, write_ply};
 //!
 //! # fn main() -> Result<(), radiosity::Error> {
 //! let backend = Backend::gpu(None)?; // or Backend::Cpu
-//! let baked = BakeTarget::Error(0.02).bake(load_obj("scene.obj")?, &backend, |progress| {
+//! let baked = BakeTarget::Error(0.02).bake(load_scene("scene.obj")?, &backend, |progress| {
 //!     if let BakeProgress::Estimated(error) = progress {
 //!         eprintln!("error about {:.1} %", 100.0 * error.total);
 //!     }
@@ -29,12 +29,12 @@
 //! ```no_run
 //! # use std::ops::ControlFlow;
 //! # use radiosity::io::ToneCurve;
-//! # use radiosity::{Backend, BakeTarget, Camera, ObjSettings, Rgb, write_glb, write_png};
+//! # use radiosity::{Backend, BakeTarget, Camera, Rgb, SceneSettings, write_glb, write_png};
 //! # fn main() -> Result<(), radiosity::Error> {
-//! let mut obj = ObjSettings::default();
-//! obj.emit.push(("bulb".into(), Rgb::splat(15.0))); // radiance of a material
-//! obj.sky = Some(Rgb::ONE.into());
-//! let (scene, go) = (obj.load("scene.obj")?, |_: &_| ControlFlow::Continue(()));
+//! let mut settings = SceneSettings::default();
+//! settings.emit.push(("bulb".into(), Rgb::splat(15.0))); // radiance of a material
+//! settings.sky = Some(Rgb::ONE.into());
+//! let (scene, go) = (settings.load("scene.obj")?, |_: &_| ControlFlow::Continue(()));
 //! let light = BakeTarget::Error(0.1).bake(scene, &Backend::Cpu, go)?.light;
 //! let image = Camera::framing(&light, 1.5).image(&light.surface, 768, 512, 4)?;
 //! write_png("scene.png", &image)?;
@@ -152,7 +152,9 @@ pub use io::write_exr;
 pub use io::write_glb;
 #[cfg(feature = "png")]
 pub use io::write_png;
-pub use io::{ObjSettings, load_obj, read_ply, write_ply};
+#[expect(deprecated, reason = "former names stay for one release")]
+pub use io::{ObjSettings, load_obj};
+pub use io::{SceneSettings, load_scene, read_ply, write_ply};
 pub use mesh::Mesh;
 pub use scene::{Material, Rgb, Scene, Sky, Sun, Triangle};
 pub use solver::{Solution, Solver};

@@ -32,10 +32,10 @@ mod up_axis;
 mod warning;
 
 use std::any::Any;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, ErrorKind, quoted};
 pub use crate::geometry::aabb::Aabb;
@@ -51,7 +51,7 @@ pub use luminaire::{Luminaire, Opening};
 pub use material::Material;
 pub use rgb::Rgb;
 pub(crate) use rgb::luminance;
-use scene_textures::SceneTextures;
+pub(crate) use scene_textures::SceneTextures;
 pub use sides::Sides;
 pub(crate) use sides::Treatment;
 pub use sky::{Sky, Sun};
@@ -60,7 +60,6 @@ pub use sky_distribution::SkyDistribution;
 pub(crate) use sky_map::SkyMap;
 pub use solar_irradiance::{LuminousEfficacy, SolarIrradiance};
 pub use specular::Specular;
-use texture::MaterialTextures;
 pub use up_axis::UpAxis;
 pub use warning::{Warning, WarningKind};
 
@@ -163,26 +162,25 @@ impl Scene {
         groups: Vec<String>,
         materials: Vec<Material>,
     ) -> Result<Scene, Error> {
-        Scene::with_textures(positions, triangles, groups, materials, vec![], BTreeMap::new())
+        Scene::with_textures(positions, triangles, groups, materials, SceneTextures::default())
     }
 
-    /// The same with texture coordinates for each triangle and textures for materials by their
-    /// indices, or none of either. Reflectance and exitance of those materials become the means of
+    /// The same with textures for materials. Reflectance and exitance of those become the means of
     /// their textures over their triangles.
     pub(crate) fn with_textures(
         positions: Vec<DVec3>,
         mut triangles: Vec<Triangle>,
         groups: Vec<String>,
         materials: Vec<Material>,
-        mut texture_coordinates: Vec<[DVec2; 3]>,
-        textures: BTreeMap<u32, MaterialTextures>,
+        mut textures: SceneTextures,
     ) -> Result<Scene, Error> {
         check(&positions, &triangles, &groups, &materials)?;
         let given = triangles.len();
         let has_area = |t: &Triangle| has_area(&positions, t);
-        let mut kept = triangles.iter().map(has_area);
-        texture_coordinates.retain(|_| kept.next().unwrap_or(false));
-        triangles.retain(has_area);
+        if !triangles.iter().all(has_area) {
+            textures.keep(|t| has_area(&triangles[t]));
+            triangles.retain(has_area);
+        }
         if triangles.is_empty() {
             return Err(none_with_area(given));
         }
@@ -201,14 +199,16 @@ impl Scene {
             up: None,
             sky: Sky::default(),
             luminaires: Arc::default(),
-            textures: SceneTextures::of_coordinates(texture_coordinates).into(),
+            textures: Arc::default(),
             cut_sides: vec![],
             crease_degrees: None,
             shape: Arc::default(),
             derived: Derived::default(),
         };
-        if !textures.is_empty() {
-            scene.lay_textures(textures);
+        let has_textures = !textures.of_materials.is_empty();
+        scene.textures = textures.into();
+        if has_textures {
+            scene.lay_textures();
             scene.materials.iter().try_for_each(Material::check)?;
         }
         if degenerate > 0 {

@@ -4,7 +4,7 @@
 
 use std::process::Command;
 
-use radiosity::io::read_obj;
+use radiosity::io::read_scene;
 use radiosity::scene::WarningKind;
 
 /// Most memory that this process ever had, bytes.
@@ -219,7 +219,7 @@ fn loads_a_case() {
     files.extend(images.iter().map(|(name, bytes)| (&name[..], &bytes[..])));
     let bytes = obj.len() + files.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
     let start = peak();
-    let scene = read_obj("it.obj", &obj, &files);
+    let scene = read_scene("it.obj", &obj, &files);
     let taken = peak() - start;
     if let (Ok(scene), [_, _, ..]) = (&scene, &images[..]) {
         let large = scene.warnings().iter().find(|w| w.kind == WarningKind::LargeTexture);

@@ -14,12 +14,12 @@ use std::time::Duration;
 
 use criterion::Criterion;
 use radiosity::backend::AdapterInfo;
-use radiosity::{Gpu, Scene, load_obj};
+use radiosity::{Gpu, Scene, load_scene};
 
 /// The Cornell box that ships with the crate; its unit is the millimetre.
 pub fn cornell_box() -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    load_obj(path).expect("the scene loads")
+    load_scene(path).expect("the scene loads")
 }
 
 /// The graphics adapter. Its name is printed: times mean nothing without it.

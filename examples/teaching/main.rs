@@ -66,7 +66,7 @@ fn main() -> Result<()> {
     let side = given.transpose().map_err(|_| "give the pixels along a picture, such as 416")?;
     let side = side.map_or(2 * POINTS, |side| side.max(POINTS));
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = Arc::new(load_obj(path)?.resolve_sides());
+    let scene = Arc::new(load_scene(path)?.resolve_sides());
     let mesh = Mesh::new(scene.clone(), ELEMENT_SIZE)?;
     let mut sheet = Sheet::new(side, 5)?;
     one_patch(&mut sheet, &mesh)?;

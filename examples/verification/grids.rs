@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use radiosity::grid::{GridSettings, MeasuredGrid, MeasuringGrid, Quantity};
-use radiosity::io::ObjSettings;
+use radiosity::io::SceneSettings;
 use radiosity::scene::SkyDistribution;
 use radiosity::{Backend, BakeTarget, GatheredMesh, Rgb, Scene, Sky};
 
@@ -88,7 +88,7 @@ fn case(name: &str, [here, error]: [f64; 2], truth: &Truth) -> Case {
 /// A room of 6 m × 4 m × 3 m with a window under an overcast sky; its daylight factor is its mean
 /// over 7π/9 of the zenith.
 fn side_lit_room() -> Result<[Case; 2]> {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sky = Some(Rgb::ONE.into());
     let zenith = Rgb::splat(ZENITH);
     let sky = Sky::new(SkyDistribution::OVERCAST, zenith, DVec3::Z, DVec3::Z)?;
@@ -106,7 +106,7 @@ fn side_lit_room() -> Result<[Case; 2]> {
 
 /// Two rooms joined by a door, the lamp in the first.
 fn room_behind_a_door() -> Result<[Case; 2]> {
-    let light = light(radiosity::load_obj(data("rooms.obj"))?)?;
+    let light = light(radiosity::load_scene(data("rooms.obj"))?)?;
     let [lit, behind] = [Truth { value: 202.95, error: 0.04 }, Truth { value: 5.30, error: 0.03 }];
     Ok([
         case("two rooms joined by a door, the lit one", mean(&light, "A_floor")?, &lit),

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use radiosity::heat::{Boundary, HeatBalance, HeatSettings, STEFAN_BOLTZMANN, Surface};
-use radiosity::{Scene, ViewFactors, load_obj};
+use radiosity::{Scene, ViewFactors, load_scene};
 
 use crate::case::{Case, Section};
 use crate::scenes::{Quad, block, cube, facing_down, facing_up, grey, quads, walls};
@@ -121,7 +121,7 @@ fn between_ends(f: f64, [hot, cold]: [f64; 2], [e1, e2]: [f64; 2]) -> [f64; 2] {
 
 /// A box of 1 × 3 × 2 with a black bottom, a grey top and adiabatic walls.
 fn grey_cavity() -> Result<[Case; 2]> {
-    let factors = exact(&load_obj(file("tests/data/cases/cavity.obj"))?, 1e-6, &[])?;
+    let factors = exact(&load_scene(file("tests/data/cases/cavity.obj"))?, 1e-6, &[])?;
     let mut surfaces = vec![adiabatic(0.75); 6];
     surfaces[0] = at(550.0, 1.0);
     surfaces[1] = at(300.0, 0.75);

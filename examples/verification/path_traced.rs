@@ -1,6 +1,6 @@
 //! Scenes at points that were path traced with Mitsuba 3.
 
-use radiosity::{Backend, BakeTarget, VertexMesh, load_obj};
+use radiosity::{Backend, BakeTarget, VertexMesh, load_scene};
 
 use crate::case::{Case, Section};
 use crate::{Result, file, go, truth};
@@ -45,7 +45,7 @@ const SCENES: [Traced; 3] = [
 pub fn section() -> Result<Section> {
     let mut cases = vec![];
     for traced in &SCENES {
-        let scene = load_obj(file(traced.scene))?.resolve_sides();
+        let scene = load_scene(file(traced.scene))?.resolve_sides();
         let baked = BakeTarget::Error(traced.asked).bake(scene, &Backend::Cpu, go)?;
         let text = std::fs::read_to_string(file(traced.truth))?;
         let surface = &baked.light.surface;

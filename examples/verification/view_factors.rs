@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use radiosity::form_factor::closed_form::point_to_polygon;
-use radiosity::{Material, Scene, Triangle, ViewFactors, load_obj};
+use radiosity::{Material, Scene, Triangle, ViewFactors, load_scene};
 use serde_json::Value;
 
 use crate::case::{Case, Section};
@@ -59,7 +59,7 @@ fn number(value: &Value) -> Result<f64> {
 }
 
 fn scene_of(case: &Value) -> Result<Scene> {
-    Ok(load_obj(file(FOLDER).join(case["obj"].as_str().ok_or("expected.json: no \"obj\"")?))?)
+    Ok(load_scene(file(FOLDER).join(case["obj"].as_str().ok_or("expected.json: no \"obj\"")?))?)
 }
 
 /// From a point to a group.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use lexopt::prelude::*;
-use radiosity::ObjSettings;
+use radiosity::SceneSettings;
 use radiosity::io::view_factors::{read_rows, write_rows};
 use radiosity::io::{SpecularSurfaces, write_npz};
 use radiosity::ranks::Ranks;
@@ -22,7 +22,7 @@ const WRITINGS: u32 = 20;
 pub fn run(parser: &mut lexopt::Parser, world: &mut World) -> Result<(), Failure> {
     let (mut scene, mut out, mut checkpoint) = (None, None, None);
     let (mut error, mut two_sided) = (1e-4, vec![]);
-    let mut reading = ObjSettings::default();
+    let mut reading = SceneSettings::default();
     reading.specular = SpecularSurfaces::Ignore;
     while let Some(arg) = parser.next()? {
         match arg {

@@ -19,9 +19,9 @@ use crate::visibility::lit_sides;
 ///
 /// ```no_run
 /// # use std::ops::ControlFlow;
-/// # use radiosity::{Backend, BakeTarget, load_obj};
+/// # use radiosity::{Backend, BakeTarget, load_scene};
 /// # fn main() -> Result<(), radiosity::Error> {
-/// let scene = load_obj("scenes/cornell_box.obj")?;
+/// let scene = load_scene("scenes/cornell_box.obj")?;
 /// let baked = BakeTarget::Error(0.02).bake(scene, &Backend::Cpu, |_| ControlFlow::Continue(()))?;
 /// println!("{:.1} % off, by estimate", 100.0 * baked.estimate.total);
 /// # Ok(())

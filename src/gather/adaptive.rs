@@ -653,7 +653,7 @@ mod tests {
     #[test]
     fn vertices_that_exchange_bounces_gather_once() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 150.0).unwrap();
         let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(|e| mesh.exitance(e)).collect();
         let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
         let mut rays = RayGather::new(&mesh, 16).unwrap();
@@ -676,7 +676,7 @@ mod tests {
     #[test]
     fn further_bounces_are_those_of_passes() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 150.0).unwrap();
         let emitted = |e| mesh.exitance(e);
         let radiosity: Vec<Rgb> = (0..mesh.element_count()).map(emitted).collect();
         let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();

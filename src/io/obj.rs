@@ -8,23 +8,22 @@
 mod faces;
 mod materials;
 pub(super) mod repairs;
-mod settings;
 mod statements;
 
 use std::collections::HashSet;
 use std::io;
 use std::path::Path;
 
-use super::cannot_read;
+use super::SceneSettings;
 use super::files::{self, FileSource};
+use super::given::emit_on_both_sides;
 use super::lights;
 use super::mtl::Library;
 use super::stl;
 use super::text::{self, Line};
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Rgb, Scene, Sides, Warning, WarningKind};
+use crate::scene::{Scene, SceneTextures, Warning, WarningKind};
 use repairs::Repairs;
-pub use settings::ObjSettings;
 use statements::{LineFeed, Statements, UNKNOWN_MATERIAL};
 
 /// What files by Blender lack, and how to give it.
@@ -32,68 +31,13 @@ const NOT_EXPORTED: &str = "it leaves out lamps, the world, vertex colours and i
     file of their own: give lamps as faces that emit, --luminaire or --sun, the world as --sky, \
     and save images (Image > Save As) before the export";
 
-/// Loads a Wavefront OBJ file and the MTL files that it names.
-///
-/// The front of a face is where its corners run counter-clockwise. A face may have any number of
-/// corners, and its outline may be concave. It belongs to the group of the latest `o` or `g` line
-/// ("default" before the first); a name that comes again continues its group. Lengths stay in the
-/// file's own unit. Normals, points, lines and curves are not used.
-///
-/// `s` puts the faces up to the next `s` into a smoothing group, whatever `o` and `g` lines come
-/// between; `s off` or `s 0` into none (Wavefront, "Object Files (.obj)", Advanced
-/// Visualizer 3.0, "Grouping"). In one group surfaces have creases at angles above
-/// [`crate::Mesh::CREASE_DEGREES`], else above [`crate::Mesh::COPLANAR_DEGREES`]. Faces before the
-/// first `s`, and after one without a group (`s` or `s on`, as some programs write), are as if in a
-/// group of their own.
-///
-/// Of a material, `Kd` is the diffuse reflectance ρ per channel, linear, and `Ke` the emitted
-/// radiance L: the exitance becomes π L, in the file's unit times steradian. Where no material has
-/// a `Ke`, a `Ka` above 1 is the radiance. Faces without a material reflect
-/// [`crate::Material::DEFAULT_REFLECTANCE`]. `illum` 3 to 7 and 9 make mirrors and glass
-/// ([`crate::scene::Specular`]), which pictures show; the light solution treats mirrors as their
-/// diffuse part alone, and passes glass straight on, attenuated by its transmittance
-/// ([`ObjSettings::specular`]).
-///
-/// Defects are repaired, and reported in [`Scene::warnings`]: libraries under other names or
-/// missing, materials that no library defines (grey), reflectances of 1 or more
-/// ([`ObjSettings::MAX_REFLECTANCE`]), polygons that cross themselves, texts in UTF-16 or Latin-1,
-/// and more; `docs/obj.md` has the whole list. [`ObjSettings`] can refuse these instead, sets the
-/// largest reflectance, and makes materials emit.
-///
-/// Files may come from anywhere. MTL files are read from the folder of the OBJ file or below, so
-/// that a scene cannot open other files of the machine (or of its network). Only regular files are
-/// read, of at most 1 GiB, as are all MTL files of a scene together. Memory stays within sixty
-/// times the size of the files.
-///
-/// # Errors
-/// [`ErrorKind::File`] for a file that cannot be read. [`ErrorKind::Scene`], with file and line,
-/// for invalid content: coordinates that are not finite numbers, corners without a vertex, no face
-/// at all; and for a scene without a triangle that has area.
-pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    ObjSettings::default().load(path)
-}
-
-/// [`load_obj`] from memory: an OBJ file of this name, used in messages, and this content. `files`
-/// are the MTL files, name and content, that its `mtllib` lines may name.
-///
-/// # Errors
-/// Those of [`load_obj`].
-pub fn read_obj(
-    name: impl AsRef<Path>,
-    obj: &[u8],
-    files: &[(&str, &[u8])],
-) -> Result<Scene, Error> {
-    ObjSettings::default().read(name, obj, files)
-}
-
 /// The scene of the OBJ file `path` with this content.
-fn read_scene(
+pub(super) fn read_scene(
     path: &Path,
-    bytes: io::Result<Vec<u8>>,
+    bytes: Vec<u8>,
     files: &FileSource,
-    settings: &ObjSettings,
+    settings: &SceneSettings,
 ) -> Result<Scene, Error> {
-    let bytes = bytes.map_err(|e| cannot_read(path, e, "give a readable OBJ file"))?;
     let mut repairs = Repairs::new(settings.strict);
     let (text, encoding) = match stl::is_stl(path) {
         true => stl::to_obj(path, bytes, &mut repairs)?,
@@ -165,7 +109,7 @@ impl<'a> ObjFile<'a> {
         }
     }
 
-    fn into_scene(mut self, settings: &ObjSettings) -> Result<Scene, Error> {
+    fn into_scene(mut self, settings: &SceneSettings) -> Result<Scene, Error> {
         if self.statements.faces.is_empty() {
             return Err(self.without_faces());
         }
@@ -180,14 +124,7 @@ impl<'a> ObjFile<'a> {
         self.library.warn(&used, settings.specular, &settings.emit, &mut self.repairs);
         let mut materials = self.materials(&used, &geometry.triangles, settings)?;
         let textures = self.textures(&used, &mut materials, settings)?;
-        if settings.emit_both_sides {
-            for (k, material) in (0u32..).zip(&mut materials) {
-                let shows_light = textures.get(&k).is_some_and(|maps| maps.exitance.is_some());
-                if shows_light || material.exitance != Rgb::ZERO {
-                    material.sides = Sides::Emitting;
-                }
-            }
-        }
+        emit_on_both_sides(&mut materials, &textures, settings);
         if textures.is_empty() && !settings.texture_coordinates {
             geometry.texture_coordinates = vec![];
         }
@@ -197,8 +134,11 @@ impl<'a> ObjFile<'a> {
             geometry.triangles,
             groups,
             materials,
-            geometry.texture_coordinates,
-            textures,
+            SceneTextures {
+                coordinates: geometry.texture_coordinates,
+                of_materials: textures,
+                ..SceneTextures::default()
+            },
         );
         let mut scene = scene.map_err(|e| e.inside(self.path))?;
         let is_used = |(i, _): &(usize, _)| used.contains(&(*i as u32));

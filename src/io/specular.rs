@@ -28,10 +28,9 @@
 //!
 //! Blender's exporter writes 3 for all opaque metals, with the metal's colour in `Kd`, `metallic`
 //! in `Ka`, 1000 (1 − roughness)² in `Ns`, and a `Ks` that has no effect on metals there. In files
-//! that begin with `# Blender` `Kd` is therefore all that such a metal reflects: `metallic` times
-//! 1 − roughness of it as a mirror, the rest diffusely, as there is no gloss here. Roughness 0 is a
-//! mirror and 1 is diffuse; what lies between is a plain choice. Metals with a `map_Kd` are
-//! diffuse, since mirrors have one colour.
+//! that begin with `# Blender` `Kd` is therefore all that such a metal reflects: of `metallic` times
+//! that a share by its roughness diffusely ([`diffuse_share_of_metal`]) and the rest as a mirror, as
+//! there is no gloss here. Metals with a `map_Kd` are diffuse, since mirrors have one colour.
 
 use crate::scene::{Rgb, Specular};
 
@@ -100,10 +99,35 @@ impl MetalStatements {
     /// What it reflects as a mirror, per channel.
     fn reflectance(&self) -> Rgb {
         let metallic = self.metallic.map_or(1.0, |share| share.element_sum() / 3.0);
-        let smoothness = self.shininess.map_or(1.0, |ns| (ns.max(0.0) / 1000.0).sqrt());
+        let smoothness = self.shininess.map_or(1.0, |ns| (ns.max(0.0) / 1000.0).sqrt().min(1.0));
         let colour = self.colour.unwrap_or(Rgb::ZERO).clamp(Rgb::ZERO, Rgb::ONE);
-        metallic.clamp(0.0, 1.0) * smoothness.min(1.0) * colour
+        metallic.clamp(0.0, 1.0) * (1.0 - diffuse_share_of_metal(1.0 - smoothness)) * colour
     }
+}
+
+/// The share of what a metal of this `roughness`, in [0, 1], reflects that counts as diffuse; the
+/// rest is that of a mirror. Together they have the energy and, with light from straight above, the
+/// mean cosine m to the mirror direction of a GGX lobe of α = roughness² (Walter, Marschner, Li and
+/// Torrance, "Microfacet models for refraction", EGSR 2007, equations 33 and 34): Lambert's cosine
+/// is 2/3 and a mirror's 1, so that the share is 3 (1 − m). Roughness 0.3, 0.5 and 0.7 are 0.15,
+/// 0.53 and 0.87; from 0.82 on it is 1.
+///
+/// With u the squared tangent of the angle of the half vector, straight reflection is
+/// ∫₀¹ α²/(α² + u)² G du, and its cosine (1 − u)/(1 + u).
+pub(super) fn diffuse_share_of_metal(roughness: f64) -> f64 {
+    /// Midpoints of equal parts of ∫ α²/(α² + u)² du = u/(α² + u): within 0.004 of 4096.
+    const POINTS: u32 = 64;
+    let alpha = roughness.clamp(0.0, 1.0).powi(2);
+    let square = alpha * alpha;
+    let (mut energy, mut along) = (0.0, 0.0);
+    for k in 0..POINTS {
+        let part = (f64::from(k) + 0.5) / f64::from(POINTS) / (1.0 + square);
+        let u = square * part / (1.0 - part);
+        let masking = 2.0 / (1.0 + (1.0 + 4.0 * square * u / (1.0 - u).powi(2)).sqrt());
+        energy += masking;
+        along += masking * (1.0 - u) / (1.0 + u);
+    }
+    (3.0 * (1.0 - along / energy)).clamp(0.0, 1.0)
 }
 
 impl SpecularStatements {
@@ -185,8 +209,11 @@ mod tests {
         };
         let mirror = |reflectance| Some(Specular::Mirror { reflectance });
         assert_eq!(metal(Some(brass), Some(1.0), Some(1000.0)), mirror(brass));
-        assert_eq!(metal(Some(brass), Some(1.0), Some(490.0)), mirror(0.49f64.sqrt() * brass));
-        assert_eq!(metal(Some(brass), Some(0.5), Some(250.0)), mirror(0.25 * brass));
+        // Roughness 0.3 and 0.5.
+        let mirrored = |roughness| 1.0 - diffuse_share_of_metal(roughness);
+        let rough_brass = metal(Some(brass), Some(1.0), Some(490.0)).unwrap().share();
+        assert!(rough_brass.abs_diff_eq(mirrored(0.3) * brass, 1e-12));
+        assert_eq!(metal(Some(brass), Some(0.5), Some(250.0)), mirror(0.5 * mirrored(0.5) * brass));
         assert_eq!(metal(Some(brass), None, None), mirror(brass));
         assert_eq!(metal(Some(2.0 * brass), Some(7.0), Some(1e9)).unwrap().share().y, 1.0);
         for (colour, metallic, shininess) in
@@ -194,6 +221,17 @@ mod tests {
         {
             assert_eq!(metal(colour, Some(metallic), Some(shininess)), None);
         }
+    }
+
+    /// Values by 4096 points of the same integral, made by another program; 0.004 is the error of
+    /// 64.
+    #[test]
+    fn rough_metal_is_diffuse() {
+        for (roughness, share) in [(0.0, 0.0), (0.1, 0.0045), (0.3, 0.1539), (0.5, 0.5266)] {
+            assert!((diffuse_share_of_metal(roughness) - share).abs() < 4e-3, "{roughness}");
+        }
+        assert!((diffuse_share_of_metal(0.7) - 0.8728).abs() < 4e-3);
+        assert_eq!(diffuse_share_of_metal(1.0), 1.0);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Textures that materials name: `map_Kd`, `map_Ke` and `map_d` with their options, and the images.
 //!
-//! Images are PNG, JPEG, BMP or TGA, all of which hold sRGB. They are searched like libraries
+//! Images are PNG, JPEG, BMP, TGA or WebP, all of which hold sRGB. They are searched like libraries
 //! ([`super::files`]). The declared size of an image is checked before memory is allocated for it.
 
 use std::collections::HashMap;
@@ -90,9 +90,22 @@ pub(super) struct Textures<'a> {
     /// Masks by name, and whether it is also the image of the material's colours: see
     /// [`super::masks`].
     pub(super) masks: HashMap<(String, bool), ReadMask>,
-    /// Remaining number of texels.
     #[cfg(feature = "textures")]
+    decoder: Decoder,
+}
+
+/// Reads images, up to a number of texels in all.
+#[cfg(feature = "textures")]
+pub(super) struct Decoder {
+    /// Remaining number of texels.
     texels_left: u64,
+}
+
+#[cfg(feature = "textures")]
+impl Default for Decoder {
+    fn default() -> Decoder {
+        Decoder { texels_left: MAX_TEXELS }
+    }
 }
 
 /// Why an image is not used: the kind, and a reason for kinds that have several.
@@ -109,7 +122,7 @@ impl<'a> Textures<'a> {
             known: HashMap::new(),
             masks: HashMap::new(),
             #[cfg(feature = "textures")]
-            texels_left: MAX_TEXELS,
+            decoder: Decoder::default(),
         }
     }
 
@@ -145,14 +158,27 @@ impl<'a> Textures<'a> {
             io::ErrorKind::FileTooLarge => Unread::large(e),
             _ => Unread::unreadable(e),
         })?;
+        self.decoder.decode(bytes, found)
+    }
+
+    #[cfg(not(feature = "textures"))]
+    pub(super) fn read(&mut self, _: &str) -> Result<Texture, Unread> {
+        Err(Unread::unreadable("this program was built without the feature `textures`"))
+    }
+}
+
+#[cfg(feature = "textures")]
+impl Decoder {
+    /// The image of the file `name` with this content, if within the limits.
+    pub fn decode(&mut self, bytes: Vec<u8>, name: &str) -> Result<image::DynamicImage, Unread> {
         let length = bytes.len() as u64;
         let mut reader = image::ImageReader::new(io::Cursor::new(bytes));
-        if let Ok(format) = image::ImageFormat::from_path(found) {
+        if let Ok(format) = image::ImageFormat::from_path(name) {
             reader.set_format(format);
         }
         // Some files named .png have another format; TGA has no signature.
         let mut reader = reader.with_guessed_format().map_err(Unread::unreadable)?;
-        let is_png = reader.format() == Some(image::ImageFormat::Png);
+        let format = reader.format();
         let mut limits = image::Limits::default();
         // Unpacked colour profiles and texts, which are read before the size is known.
         limits.max_alloc = Some(1 << 24);
@@ -163,15 +189,26 @@ impl<'a> Textures<'a> {
         // bits: RFC 1951, 3.2.5), of eight texels each. JPEG has at least a bit for each 8 × 8
         // texels (ITU-T T.81, F and G), BMP and TGA have two bytes for each run of up to 255 and
         // 128. So a file of a hundred bytes cannot pass as a truncated one of 10 000 × 10 000
-        // texels.
-        self.check(width, height, length * if is_png { 8 * 1032 } else { 512 })?;
+        // texels. WebP codes an image of one colour without a bit for each texel (RFC 9649, 5.2):
+        // plain choice.
+        let texels_a_byte = match format {
+            Some(image::ImageFormat::Png) => 8 * 1032,
+            Some(image::ImageFormat::WebP) => 1 << 17,
+            _ => 512,
+        };
+        self.check(width, height, length * texels_a_byte)?;
         let image = image::DynamicImage::from_decoder(decoder).map_err(Unread::undecoded)?;
         self.texels_left -= u64::from(width) * u64::from(height);
         Ok(image)
     }
 
+    /// Leaves the texels of an image out of the limit, as it counts already.
+    #[cfg(feature = "glb")]
+    pub fn give_back(&mut self, width: u32, height: u32) {
+        self.texels_left += u64::from(width) * u64::from(height);
+    }
+
     /// Checks the size of an image whose file has bytes for at most `most` texels.
-    #[cfg(feature = "textures")]
     fn check(&self, width: u32, height: u32, most: u64) -> Result<(), Unread> {
         let texels = u64::from(width) * u64::from(height);
         if width.max(height) > MAX_SIDE {
@@ -189,11 +226,6 @@ impl<'a> Textures<'a> {
             )));
         }
         Ok(())
-    }
-
-    #[cfg(not(feature = "textures"))]
-    pub(super) fn read(&mut self, _: &str) -> Result<Texture, Unread> {
-        Err(Unread::unreadable("this program was built without the feature `textures`"))
     }
 }
 
@@ -264,7 +296,8 @@ mod tests {
         let (large, small) = (tga(9, 9), tga(3, 3));
         let files: [(&str, &[u8]); 3] = [("a.tga", &large), ("b.tga", &large), ("c.tga", &small)];
         let files = FileSource::in_memory(&files);
-        let mut textures = Textures { texels_left: 100, ..Textures::new(&files) };
+        let mut textures =
+            Textures { decoder: Decoder { texels_left: 100 }, ..Textures::new(&files) };
         let mut size = |name| textures.get(name).map(|texture| texture.size());
         assert_eq!(size("a.tga"), Ok([9, 9]));
         let unread = size("b.tga").unwrap_err();
@@ -277,6 +310,6 @@ mod tests {
             [size("b.tga"), size("a.tga"), size("c.tga")],
             [Err(unread), Ok([9, 9]), Ok([3, 3])]
         );
-        assert_eq!(textures.texels_left, 100 - 81 - 9);
+        assert_eq!(textures.decoder.texels_left, 100 - 81 - 9);
     }
 }

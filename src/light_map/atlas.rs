@@ -38,12 +38,12 @@ impl Atlas {
     /// Lays out all triangles of `scene`, one for each side that reflects
     /// ([`Scene::resolve_sides`]): [`Atlas::scene`] has them, and is the scene to bake.
     ///
-    /// Coordinates of the file ([`ObjSettings::texture_coordinates`]) are usable if all triangles
+    /// Coordinates of the file ([`SceneSettings::texture_coordinates`]) are usable if all triangles
     /// have them, within [0, 1], and none overlap by more than a quarter of a texel. New ones have
     /// one or several charts for each smooth surface: none crosses a crease. Charts lie six texels
     /// apart: on either side one that points on the outline use, and two of dilation.
     ///
-    /// [`ObjSettings::texture_coordinates`]: crate::ObjSettings::texture_coordinates
+    /// [`SceneSettings::texture_coordinates`]: crate::SceneSettings::texture_coordinates
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] for a resolution that is not above 0, or that makes more than 8192

@@ -16,6 +16,7 @@
 //! made along nearly every line with light on both its sides, or a slit on one: see [`openness`].
 //! Points nearer than [`SNAP_DISTANCE`] are merged: see [`snapping`].
 
+mod crossings;
 mod openness;
 mod snapping;
 mod triangulation;

@@ -26,7 +26,7 @@ impl Mesh {
         }
         for (m, mask) in scene.masks() {
             let texture = &mask.texture;
-            add(&mut all, &(m, mask.clamped, mask.scale, mask.offset, texture.size()));
+            add(&mut all, &(m, mask.clamped, mask.placement, texture.size()));
             all.update(texture.bytes());
         }
         let sky = scene.sky();

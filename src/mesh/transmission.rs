@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn what_is_opaque_passes_nothing_on() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 300.0).unwrap();
         let transmission = Transmission::new(&mesh);
         assert!(transmission.is_none() && transmission.behind(3).is_empty());
         assert_eq!(transmission.passed(3), Rgb::ZERO);

@@ -30,6 +30,7 @@ impl Scene {
         let mut scene = Scene { positions: vec![], triangles: vec![], ..self.clone() };
         let mut textures = (*self.textures).clone();
         textures.coordinates.clear();
+        textures.colours.clear();
         textures.relative_exitance.clear();
         textures.solid_shares.clear();
         scene.cut_sides.clear();
@@ -44,6 +45,10 @@ impl Scene {
                 if let Some([a, b, c]) = self.texture_coordinates(t) {
                     let point = |[u, v]: [f64; 2]| -> DVec2 { a * (1.0 - u - v) + b * u + c * v };
                     textures.coordinates.push(piece.weights.map(point));
+                }
+                if !self.textures.colours.is_empty() {
+                    let colours = piece.weights.map(|at| self.colour(t, at).as_vec3());
+                    textures.colours.push(colours);
                 }
                 textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
             }

@@ -108,7 +108,7 @@ impl TextureMap {
     /// The position of texture coordinates, as in the file, in texels, rows from the top.
     pub(crate) fn in_texels(&self, uv: DVec2) -> DVec2 {
         let [width, height] = self.texture.size().map(f64::from);
-        let place = uv * self.scale + self.offset;
+        let place = self.placed(uv);
         DVec2::new(place.x * width, (1.0 - place.y) * height)
     }
 
@@ -125,7 +125,7 @@ impl TextureMap {
         if !corners.iter().all(|corner| corner.is_finite()) {
             return 1.0;
         }
-        let [a, b, c] = corners.map(|uv| uv * self.scale + self.offset);
+        let [a, b, c] = corners.map(|uv| self.placed(uv));
         let share = if (b - a).perp_dot(c - a) != 0.0 {
             self.texture.mean_by_cells([a, b, c], self.clamped, cells).x
         } else {
@@ -166,7 +166,7 @@ impl TextureMap {
     /// Whether this mask has the holes of another, for the same texture coordinates.
     fn has_holes_of(&self, other: &TextureMap) -> bool {
         self.texture.has_texels_of(&other.texture)
-            && (self.scale, self.offset, self.clamped) == (other.scale, other.offset, other.clamped)
+            && (self.placement, self.clamped) == (other.placement, other.clamped)
     }
 }
 

@@ -61,6 +61,7 @@ impl Scene {
         scene.triangles.clear();
         scene.cut_sides.clear();
         textures.coordinates.clear();
+        textures.colours.clear();
         textures.relative_exitance.clear();
         textures.solid_shares.clear();
         let mut dark: BTreeMap<u32, u32> = BTreeMap::new();
@@ -70,10 +71,12 @@ impl Scene {
         let twins = (0..treatments.len()).filter(is_doubled).map(|t| (t, true));
         for (t, is_twin) in kept.chain(twins) {
             let (mut triangle, mut coordinates) = (self.triangles[t], self.texture_coordinates(t));
+            let mut colours = self.textures.colours.get(t).copied();
             let mut cut = self.cut_sides.get(t).copied();
             if treatments[t].turned != is_twin {
                 triangle.corners.swap(1, 2);
                 coordinates.iter_mut().for_each(|corners| corners.swap(1, 2));
+                colours.iter_mut().for_each(|corners| corners.swap(1, 2));
                 // From corners a, b, c to a, c, b: the side bc stays in the middle.
                 cut.iter_mut().for_each(|sides| sides.swap(0, 2));
             }
@@ -94,6 +97,7 @@ impl Scene {
             scene.triangles.push(triangle);
             scene.cut_sides.extend(cut);
             textures.coordinates.extend(coordinates);
+            textures.colours.extend(colours);
             textures.relative_exitance.extend(self.textures.relative_exitance.get(t));
             textures.solid_shares.extend(self.textures.solid_shares.get(t));
         }

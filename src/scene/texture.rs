@@ -14,7 +14,7 @@ mod triangle_mean;
 
 use std::sync::{Arc, OnceLock};
 
-use glam::DVec2;
+use glam::{DAffine2, DVec2};
 
 use super::rgb::Rgb;
 use triangle_mean::RowSums;
@@ -227,6 +227,12 @@ fn linear_colour(texel: [u8; 3]) -> Rgb {
     Rgb::from_array(texel.map(|s| linear()[s as usize]))
 }
 
+/// Linear value of an 8-bit sRGB channel.
+#[cfg(all(feature = "glb", feature = "textures"))]
+pub(crate) fn linear_of_srgb(code: u8) -> f64 {
+    linear()[code as usize]
+}
+
 /// Linear values of 8-bit sRGB.
 fn linear() -> &'static [f64; 256] {
     static LINEAR: OnceLock<[f64; 256]> = OnceLock::new();
@@ -250,29 +256,39 @@ pub struct TextureMap {
     pub ceiling: f64,
     /// Mean over the triangles of the material, per channel.
     pub mean: Rgb,
-    /// Texture coordinates of a corner are multiplied by this,
-    pub scale: DVec2,
-    /// and then this is added.
-    pub offset: DVec2,
+    /// From texture coordinates of a corner to those of the image.
+    pub placement: DAffine2,
     /// Whether the image continues with its border beyond 0 and 1 instead of repeating.
     pub clamped: bool,
 }
 
 impl TextureMap {
+    /// `texture` with a factor of 1, where the coordinates are; repeated.
+    pub fn new(texture: Arc<Texture>) -> TextureMap {
+        let (factor, ceiling, mean) = (Rgb::ONE, f64::MAX, Rgb::ONE);
+        let placement = DAffine2::IDENTITY;
+        TextureMap { texture, factor, ceiling, mean, placement, clamped: false }
+    }
+
+    /// Where texture coordinates as in the file are in the image.
+    pub(crate) fn placed(&self, uv: DVec2) -> DVec2 {
+        self.placement.transform_point2(uv)
+    }
+
     /// The value at texture coordinates as in the file.
     pub fn at(&self, uv: DVec2) -> Rgb {
-        self.value(self.texture.at(uv * self.scale + self.offset, self.clamped))
+        self.value(self.texture.at(self.placed(uv), self.clamped))
     }
 
     /// The value of the texel that contains texture coordinates as in the file.
     pub(crate) fn texel(&self, uv: DVec2) -> Rgb {
-        self.value(self.texture.texel_at(uv * self.scale + self.offset, self.clamped))
+        self.value(self.texture.texel_at(self.placed(uv), self.clamped))
     }
 
     /// The value at texture coordinates as in the file, filtered over `area` of them.
     pub(crate) fn filtered(&self, uv: DVec2, area: f64) -> Rgb {
-        let area = area * (self.scale.x * self.scale.y).abs();
-        self.value(self.texture.filtered(uv * self.scale + self.offset, area, self.clamped))
+        let area = area * self.placement.matrix2.determinant().abs();
+        self.value(self.texture.filtered(self.placed(uv), area, self.clamped))
     }
 
     /// The mean over a triangle with these texture coordinates, as in the file.
@@ -282,7 +298,7 @@ impl TextureMap {
 
     /// The same, with at most `cells` cells of the image along the triangle's outline.
     pub(super) fn mean_by_cells(&self, corners: [DVec2; 3], cells: f64) -> Rgb {
-        let corners = corners.map(|uv| uv * self.scale + self.offset);
+        let corners = corners.map(|uv| self.placed(uv));
         self.value(self.texture.mean_by_cells(corners, self.clamped, cells))
     }
 

@@ -11,11 +11,10 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::scene_textures::SceneTextures;
 use super::texture::{MAX_OUTLINE_CELLS, MaterialTextures, TextureMap};
 use super::{Rgb, Scene};
 use crate::geometry::barycentric::WHOLE;
@@ -27,7 +26,7 @@ pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
 impl Scene {
     /// Texture coordinates (u, v) of the corners of triangle `t`, as in the file; `None` if the
-    /// scene has no textures, unless they were [kept](crate::ObjSettings::texture_coordinates). Not
+    /// scene has no textures, unless they were [kept](crate::SceneSettings::texture_coordinates). Not
     /// finite for a corner without them.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
         self.textures.coordinates.get(t).copied()
@@ -47,7 +46,17 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn reflectance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
-        self.filtered(t, map, self.material(t).reflectance, barycentric, share)
+        let colour = self.colour(t, barycentric);
+        self.filtered(t, map, self.material(t).reflectance, barycentric, share, colour)
+    }
+
+    /// The colour that a textured reflectance is multiplied by at a point: of vertices, or white.
+    pub(super) fn colour(&self, t: usize, [u, v]: [f64; 2]) -> Rgb {
+        let of_point = |&[a, b, c]: &[Vec3; 3]| {
+            let [a, b, c] = [a, b, c].map(|colour| colour.as_dvec3());
+            a * (1.0 - u - v) + b * u + c * v
+        };
+        self.textures.colours.get(t).map_or(Rgb::ONE, of_point)
     }
 
     /// The fraction of the light arriving around a point that is scattered diffusely, on either
@@ -72,11 +81,11 @@ impl Scene {
     /// The same, filtered over a fraction of the triangle's area.
     pub(crate) fn exitance_around(&self, t: usize, barycentric: [f64; 2], share: f64) -> Rgb {
         let map = self.textures(t).and_then(|textures| textures.exitance.as_ref());
-        self.filtered(t, map, self.material(t).exitance, barycentric, share)
+        self.filtered(t, map, self.material(t).exitance, barycentric, share, Rgb::ONE)
     }
 
-    /// The value of `map` at a point of triangle `t`, filtered over a fraction of its area, for
-    /// this `mean` of the material; the mean if there is no map.
+    /// The value of `map` times `colour` at a point of triangle `t`, filtered over a fraction of its
+    /// area, for this `mean` of the material; the mean if there is no map.
     fn filtered(
         &self,
         t: usize,
@@ -84,11 +93,12 @@ impl Scene {
         mean: Rgb,
         barycentric: [f64; 2],
         share: f64,
+        colour: Rgb,
     ) -> Rgb {
         let Some(map) = map else { return mean };
         let [a, b, c] = WHOLE.map(|corner| self.texture_point(t, corner));
         let area = share * 0.5 * (b - a).perp_dot(c - a).abs();
-        map.scaled(map.filtered(self.texture_point(t, barycentric), area), mean)
+        map.scaled(colour * map.filtered(self.texture_point(t, barycentric), area), mean)
     }
 
     /// Exitance per channel, W/m², with which triangle `t` lights others: that of its material, or
@@ -110,7 +120,7 @@ impl Scene {
 
     /// Mean reflectance per channel of each of `pieces`.
     pub(crate) fn mean_reflectances(&self, pieces: &[Piece]) -> Vec<Rgb> {
-        let means = self.solid_means(pieces, |textures| textures.reflectance.as_ref());
+        let means = self.reflectance_means(pieces);
         let scaled = |(&(t, _), mean): (&Piece, Option<Rgb>)| {
             let whole = self.material(t).reflectance;
             let map = self.textures(t).and_then(|textures| textures.reflectance.as_ref());
@@ -119,15 +129,25 @@ impl Scene {
         pieces.iter().zip(means).map(scaled).collect()
     }
 
-    /// Assigns textures to materials, by their indices; the triangles have texture coordinates.
-    pub(super) fn lay_textures(&mut self, of_materials: BTreeMap<u32, MaterialTextures>) {
-        let has_masks = of_materials.values().any(|textures| textures.mask.is_some());
-        self.textures = SceneTextures { of_materials, ..(*self.textures).clone() }.into();
+    /// Mean of the texture of reflectance over the solid part of each of `pieces`, times the mean of
+    /// the colours of vertices; none for those without one. Exact unless both differ on a piece.
+    fn reflectance_means(&self, pieces: &[Piece]) -> Vec<Option<Rgb>> {
+        let mut means = self.solid_means(pieces, |textures| textures.reflectance.as_ref());
+        for (mean, &(t, [a, b, c])) in means.iter_mut().zip(pieces) {
+            let middle = [0, 1].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+            *mean = mean.map(|mean| mean * self.colour(t, middle));
+        }
+        means
+    }
+
+    /// Gives materials the means of their textures.
+    pub(super) fn lay_textures(&mut self) {
+        let has_masks = self.textures.of_materials.values().any(|maps| maps.mask.is_some());
         let pieces: Vec<Piece> = (0..self.triangles.len()).map(|t| (t, WHOLE)).collect();
         if has_masks {
             self.find_solid_shares();
         }
-        let reflected = self.solid_means(&pieces, |textures| textures.reflectance.as_ref());
+        let reflected = self.reflectance_means(&pieces);
         let emitted = self.solid_means(&pieces, |textures| textures.exitance.as_ref());
         let reflectances = self.means_of_materials(&reflected);
         let exitances = self.means_of_materials(&emitted);

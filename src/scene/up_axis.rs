@@ -52,9 +52,14 @@ const PRIOR: f64 = -0.2;
 const BALANCED: f64 = 1.1;
 
 impl UpAxis {
-    /// The more likely of +y and +z in `scene`, which has luminaires at these positions, with
+    /// The direction that the file's format has, as glTF; else the more likely of +y and +z in
+    /// `scene`, which has luminaires at these positions, with
     /// their aims where those are given.
     pub fn of(scene: &Scene, luminaires: &[(DVec3, Option<DVec3>)]) -> UpAxis {
+        if let Some(axis) = scene.up {
+            let reasons = vec!["the format of its file".into()];
+            return UpAxis { axis, reasons, is_balanced: false };
+        }
         let mut evidence = words::evidence(scene);
         evidence.extend(luminaires::evidence(scene, luminaires));
         evidence.push(geometry::evidence(scene));

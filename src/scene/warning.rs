@@ -67,8 +67,8 @@ warning_kinds! {
     FaceWithoutMaterial: "face without a material", "faces without a material";
     /// A material with neither reflectance nor radiance.
     MaterialWithoutColour:
-        "material with neither `Kd` nor `Ke`",
-        "materials with neither `Kd` nor `Ke`";
+        "material with neither colour nor emission",
+        "materials with neither colour nor emission";
     /// A material that is defined several times.
     RedefinedMaterial: "material with several definitions", "materials with several definitions";
     /// A reflectance of 1 or more in a channel.
@@ -84,10 +84,10 @@ warning_kinds! {
         => "begin with `newmtl NAME`; write three finite numbers r g b, or one for all three";
     /// A missing texture.
     MissingTexture: "texture that is not there", "textures that are not there"
-        => "put the image, as PNG, JPEG, BMP or TGA, into the folder of the OBJ file";
+        => "put the image, as PNG, JPEG, BMP, TGA or WebP, into the folder of the scene";
     /// A texture that is not an image, or is truncated.
     UnreadableTexture: "texture that cannot be read", "textures that cannot be read"
-        => "give a whole image, as PNG, JPEG, BMP or TGA";
+        => "give a whole image, as PNG, JPEG, BMP, TGA or WebP";
     /// A texture that exceeds the limits, alone or with those before it.
     LargeTexture: "texture that is too large", "textures that are too large"
         => "make images smaller: a side of 32768 texels, 134217728 in all";
@@ -97,8 +97,25 @@ warning_kinds! {
         "textures with options that are not used";
     /// Transparency, which is not modelled.
     Transparency: "material with transparency", "materials with transparency";
-    /// A metal as Blender writes it.
-    Metal: "material of metal by Blender", "materials of metal by Blender";
+    /// A metal, as Blender writes it into OBJ files or by its metallic factor in glTF.
+    Metal: "material of metal", "materials of metal";
+    /// A glTF material whose metallic factor is the format's default.
+    MetalByDefault: "material without a metallic factor", "materials without a metallic factor";
+    /// An unlit glTF material.
+    Unlit: "unlit material", "unlit materials";
+    /// Lamps of a glTF file, whose unit is uncertain beside that of emitting surfaces.
+    LampUnits: "lamp in candela or lux", "lamps in candela or lux";
+    /// A lamp whose light ends at a range.
+    LampRange: "lamp with a range", "lamps with ranges";
+    /// Directional lamps beside the brightest one.
+    MoreSuns: "directional lamp beside another one", "directional lamps beside another one";
+    /// A part of a file by an extension of its format that is not read.
+    Extension: "extension that is not read", "extensions that are not read";
+    /// Nodes that are children of several others.
+    SharedNode: "node below several others", "nodes below several others"
+        => "each node must have one parent";
+    /// A mesh that the joints of a skin pose.
+    Skin: "mesh posed by a skin", "meshes posed by skins";
     /// A mirror whose `Kd` and `Ks` add up to more than 1.
     MoreThanAll:
         "mirror whose `Kd` and `Ks` are more than 1 together",

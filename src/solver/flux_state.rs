@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn received_light_takes_the_place_of_emission() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 300.0).unwrap();
         let light = mesh.scene().materials().iter().position(|m| m.exitance != Rgb::ZERO).unwrap();
         let irradiance = vec![Rgb::new(1.0, 2.0, 3.0); mesh.element_count()];
         let received = ReceivedLight { irradiance, materials: vec![light as u32] };

@@ -142,7 +142,7 @@ mod tests {
     /// Saves a session of three batches, applies `damage`, and expects an error that names `place`.
     fn expect_refusal(solver: Solver, place: &str, damage: fn(&mut SavedSession)) {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 300.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 300.0).unwrap();
         let mut rows = RayRows::new(&mesh, 64).unwrap();
         let mut session = solver.begin(&mesh).unwrap();
         for _ in 0..3 {

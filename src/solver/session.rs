@@ -29,7 +29,7 @@ use crate::progress::StopReason;
 /// # use radiosity::*;
 /// # use std::ops::ControlFlow;
 /// # fn main() -> Result<(), Error> {
-/// # let scene = load_obj("scenes/cornell_box.obj")?;
+/// # let scene = load_scene("scenes/cornell_box.obj")?;
 /// let mesh = Mesh::new(scene, 300.0)?;
 /// let mut rows = RayRows::new(&mesh, 256)?;
 /// let mut solve = Solver::for_mesh(&mesh).begin(&mesh)?;

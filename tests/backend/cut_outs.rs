@@ -11,7 +11,7 @@ use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::scene::Sides;
 use radiosity::verify::PathTracer;
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, FormFactors, Gather, Mesh, ObjSettings, Rgb, Scene, Sky, Sun,
+    Backend, BakeTarget, ErrorKind, FormFactors, Gather, Mesh, Rgb, Scene, SceneSettings, Sky, Sun,
 };
 
 use crate::common::changes::same_rays;
@@ -33,7 +33,7 @@ const LIBRARY: &str = "newmtl grey\nKd 0.5\nnewmtl black\nKd 0\nnewmtl sheet\nKd
 
 /// A scene of one side each, of materials of [`LIBRARY`].
 fn scene(parts: &[Part], mask: &Lattice, sky: impl Into<Sky>) -> Scene {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     (settings.sides, settings.sky) = (Sides::Front, Some(sky.into()));
     read(parts, LIBRARY, &[("mask.tga", &mask.image())], &settings)
 }

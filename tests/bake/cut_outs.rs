@@ -2,7 +2,7 @@
 
 use radiosity::bake::Outcome;
 use radiosity::verify::{Settings, verify};
-use radiosity::{Backend, BakeResult, BakeTarget, ObjSettings, Rgb, Scene};
+use radiosity::{Backend, BakeResult, BakeTarget, Rgb, Scene, SceneSettings};
 
 use crate::common::cut_outs::{Lattice, Part, board, read};
 use crate::common::keep_going;
@@ -44,7 +44,7 @@ fn a_floor_under_a_grille_is_as_under_one_that_is_there() {
     let grille = facing_up([-1.0, 1.0], [-1.0, 1.0], 0.5);
     let floor: Part = (facing_up([-1.0, 1.0], [-1.0, 1.0], 0.0), "grey");
     let library = "newmtl grey\nKd 0.5\nnewmtl grille\nKd 0.5\nmap_d mask.tga\n";
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sky = Some(SKY.into());
     let scene = |grille: Vec<Part>| {
         let parts = [vec![floor], grille].concat();
@@ -75,7 +75,7 @@ fn a_room_with_a_lamp_behind_a_screen_is_as_path_traced() {
         newmtl cell\nKd 0.7 0.3 0.2\nnewmtl lamp\nKd 0\nKe 9 8 6\n";
     let images = [("mask.tga", &mask.image()[..])];
     let scene = |screen: Vec<Part>| {
-        read(&[&parts[..], &screen].concat(), library, &images, &ObjSettings::default())
+        read(&[&parts[..], &screen].concat(), library, &images, &SceneSettings::default())
     };
     let cells = mask.cells(screen).into_iter().map(|cell| (cell, "cell"));
     checked(&scene(vec![(screen, "screen")]), &scene(cells.collect()), 0.05);
@@ -94,7 +94,7 @@ fn a_textured_leaf_with_holes_lets_light_through() {
     let library = "newmtl ground\nKd 0.4\nnewmtl leaf\nKd 0.9\nmap_Kd colours.tga\n\
         map_d -s 2 1 -o 0.25 0 mask.tga\n";
     let images = [("mask.tga", &mask.image()[..]), ("colours.tga", &colours[..])];
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.transmit.push(("leaf".into(), Rgb::new(0.1, 0.3, 0.05)));
     settings.sky = Some(SKY.into());
     let scene = read(&parts, library, &images, &settings);
@@ -111,7 +111,7 @@ fn a_sheet_that_is_all_hole_is_not_there() {
         let mut parts: Vec<Part> = walls([0.0; 3], [2.0; 3]).map(|wall| (wall, "wall")).into();
         parts.push((facing_down([0.5, 1.2], [0.5, 1.5], 1.9), "lamp"));
         parts.extend_from_slice(sheets);
-        let scene = read(&parts, library, &images, &ObjSettings::default());
+        let scene = read(&parts, library, &images, &SceneSettings::default());
         BakeTarget::Error(0.05).bake(scene, &Backend::Cpu, keep_going).unwrap()
     };
     let with = bake(&[(facing_up([0.2, 1.8], [0.3, 1.7], 1.0), "sheet")]);

@@ -6,7 +6,7 @@ use glam::DVec3;
 use radiosity::bake::Outcome;
 use radiosity::scene::{IntensityDistribution, Luminaire, Opening};
 use radiosity::verify::{Settings, verify};
-use radiosity::{Backend, BakeSettings, BakeTarget, Camera, Material, ObjSettings, Rgb, Sky};
+use radiosity::{Backend, BakeSettings, BakeTarget, Camera, Material, Rgb, SceneSettings, Sky};
 
 use crate::common::scenes::{paint, quads, standing_block, walls};
 use crate::common::{cube, keep_going};
@@ -67,7 +67,7 @@ fn a_room_lit_by_luminaires_is_as_exact_as_asked() {
 #[test]
 fn luminaires_take_the_place_of_the_sky_that_nobody_asked_for() {
     let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sky = Some(Sky::default());
     let scene = settings.read("floor.obj", obj, &[]).unwrap();
     let warned = scene.warnings().len();

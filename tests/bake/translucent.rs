@@ -7,7 +7,7 @@ use radiosity::bake::Outcome;
 use radiosity::scene::SkyDistribution;
 use radiosity::verify::{PathTracer, Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, Camera, Material, ObjSettings, Rgb, Scene, Sky, Sun, VertexMesh,
+    Backend, BakeTarget, Camera, Material, Rgb, Scene, SceneSettings, Sky, Sun, VertexMesh,
 };
 
 use crate::common::scenes::{Quad, facing_up, lamp, paint, quads, walls};
@@ -177,7 +177,7 @@ fn a_textured_leaf_lets_light_through_in_its_colours() {
     let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
         usemtl leaf\nf 1/1 2/2 3/3 4/4\n";
     let library: &[u8] = b"newmtl leaf\nKd 0.8\nmap_Kd -clamp on a.tga\n";
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.transmit.push(("leaf".into(), Rgb::splat(0.4)));
     settings.sky = Some(Rgb::ONE.into());
     let files: [(&str, &[u8]); 2] = [("a.mtl", library), ("a.tga", &image)];

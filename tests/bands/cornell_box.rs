@@ -30,7 +30,7 @@ fn measured_spectra_have_the_colours_of_the_material_file() {
     let band = |nm: &f64| Band { name: nm.to_string(), wavelength: Some(*nm) };
     let observer = Observer::new(&wavelengths.iter().map(band).collect::<Vec<_>>()).unwrap();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = radiosity::load_obj(path).unwrap();
+    let scene = radiosity::load_scene(path).unwrap();
     let material = |name: &str| scene.materials().iter().find(|m| m.name == name).unwrap();
     let daylight: Vec<f64> = wavelengths.iter().map(|&nm| linear(&D65, 10.0, nm)).collect();
     let white = observer.linear_srgb(&daylight);

@@ -1,7 +1,7 @@
 //! A band is the same, to the last bit, in any order and whichever others there are.
 
 use radiosity::bands::{BandLight, BandMaterial, Bands};
-use radiosity::load_obj;
+use radiosity::load_scene;
 
 use super::{bake, light, numbered};
 
@@ -34,7 +34,7 @@ fn bits(light: &BandLight, b: usize) -> Vec<u64> {
 #[test]
 fn bands_have_the_same_bits_in_any_order_and_company() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let baked = bake(load_obj(path).unwrap(), 300.0, 64);
+    let baked = bake(load_scene(path).unwrap(), 300.0, 64);
     // Each wall its own slope over nine bands, black in some; the lamp emits in all but the first.
     let walls = baked.mesh.scene().materials().iter().enumerate().map(|(m, material)| {
         let reflectance = (0..9).map(|b| ((b * (m + 1)) % 10) as f64 / 10.0).collect();

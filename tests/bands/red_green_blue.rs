@@ -1,7 +1,7 @@
 //! Bands that are red, green and blue have the light of the bake itself.
 
 use radiosity::bands::Bands;
-use radiosity::{Backend, BakeResult, BakeTarget, Rgb, Scene, load_obj};
+use radiosity::{Backend, BakeResult, BakeTarget, Rgb, Scene, load_scene};
 
 use super::light;
 use crate::common::keep_going;
@@ -36,5 +36,5 @@ fn check(scene: Scene, error: f64) {
 #[test]
 fn cornell_box_has_the_light_of_its_bake() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    check(load_obj(path).unwrap(), 0.05);
+    check(load_scene(path).unwrap(), 0.05);
 }

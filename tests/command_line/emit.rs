@@ -21,7 +21,7 @@ fn names_that_are_no_material_are_explained() {
     let walls: String = ["lamp", "wall", "floor"].map(|group| triangle(group, "white")).concat();
     let shared = write(folder.path(), "shared.obj", &format!("mtllib m.mtl\n{walls}"));
     let want = "'lamp' is a group, of material 'white', which 3 groups share; \
-                give it its own usemtl";
+                give it a material of its own";
     emit(shared.to_str().unwrap(), "lamp", &[want]);
     let both = triangle("lamp", "white") + &triangle("lamp", "black");
     let both = write(folder.path(), "both.obj", &format!("mtllib m.mtl\n{both}"));

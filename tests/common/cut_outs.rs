@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use glam::DVec3;
-use radiosity::{ObjSettings, Scene};
+use radiosity::{Scene, SceneSettings};
 
 use super::scenes::Quad;
 use super::textured::tga;
@@ -60,7 +60,7 @@ pub fn read(
     parts: &[Part],
     library: &str,
     images: &[(&str, &[u8])],
-    settings: &ObjSettings,
+    settings: &SceneSettings,
 ) -> Scene {
     let mut text = "mtllib a.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n".to_string();
     for (k, (corners, material)) in parts.iter().enumerate() {

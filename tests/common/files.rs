@@ -24,7 +24,7 @@ pub fn through_obj(scene: &Scene, folder: &Path) -> Result<Scene, radiosity::Err
     let path = folder.join("scene.obj");
     std::fs::write(folder.join("scene.mtl"), mtl).expect("a scratch file");
     std::fs::write(&path, obj).expect("a scratch file");
-    radiosity::load_obj(path)
+    radiosity::load_scene(path)
 }
 
 /// The radiosity of every vertex of a PLY file as the crate writes it, channel after channel.

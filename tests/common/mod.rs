@@ -8,6 +8,8 @@ pub mod device_rays;
 pub mod fakes;
 pub mod files;
 pub mod framed;
+#[cfg(feature = "glb")]
+pub mod gltf;
 pub mod hemicubes;
 pub mod measures;
 pub mod processes;

@@ -69,7 +69,7 @@ pub fn cube(material: &Material) -> Scene {
 /// The Cornell box that ships with the crate, in elements of at most `size` millimetres.
 pub fn cornell_box(size: f64) -> Mesh {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    Mesh::new(radiosity::load_obj(path).expect("the scene loads"), size).expect("a good size")
+    Mesh::new(radiosity::load_scene(path).expect("the scene loads"), size).expect("a good size")
 }
 
 /// The scene with all triangles cut at the middles of their sides.

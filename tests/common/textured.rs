@@ -1,6 +1,6 @@
 //! Boxes with textured walls, and images for them.
 
-use radiosity::{Mesh, ObjSettings, Rgb, Scene};
+use radiosity::{Mesh, Rgb, Scene, SceneSettings};
 
 /// An uncompressed TGA image: rows from the top of texels of red, green and blue.
 pub fn tga(width: u16, texels: &[[u8; 3]]) -> Vec<u8> {
@@ -31,7 +31,7 @@ const BOX: &str = "mtllib box.mtl\n\
 
 fn read(text: &str, library: &str, image: &[u8]) -> Scene {
     let files: [(&str, &[u8]); 2] = [("box.mtl", library.as_bytes()), ("a.tga", image)];
-    ObjSettings::default().read("box.obj", text.as_bytes(), &files).unwrap()
+    SceneSettings::default().read("box.obj", text.as_bytes(), &files).unwrap()
 }
 
 /// A box under a ceiling that is its lamp. Of the wall x = 0 the half at y < ½ is of

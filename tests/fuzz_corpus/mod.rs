@@ -2,6 +2,8 @@
 //! that once crashed, took too long or broke something. `docs/robustness.md` says how to look for
 //! more.
 
+#[cfg(feature = "glb")]
+mod gltf;
 mod luminaire;
 #[cfg(feature = "npz")]
 mod npz;
@@ -61,6 +63,13 @@ fn every_ply_input_keeps_its_promises() {
 fn every_stl_input_keeps_its_promises() {
     let (accepted, refused) = replay("stl", stl::try_stl);
     assert!(accepted > 4 && refused > 4, "{accepted} accepted, {refused} refused");
+}
+
+#[test]
+#[cfg(feature = "glb")]
+fn every_gltf_file_keeps_its_promises() {
+    let (accepted, refused) = replay("gltf", gltf::try_gltf);
+    assert!(accepted > 10 && refused > 10, "{accepted} accepted, {refused} refused");
 }
 
 #[test]

@@ -10,7 +10,7 @@
 //! An image of any kind is told by its content; what has no sign of its own is taken for a TGA.
 
 use radiosity::backend::cpu::RayRows;
-use radiosity::io::ObjSettings;
+use radiosity::io::SceneSettings;
 use radiosity::{Error, ErrorKind, Mesh, Rgb, Scene, Sky, Solver, VertexMesh};
 use std::ops::ControlFlow;
 
@@ -74,8 +74,8 @@ fn encoded(text: &[u8], choice: u8) -> Vec<u8> {
     }
 }
 
-fn settings(choice: u8) -> ObjSettings {
-    let mut settings = ObjSettings::default();
+fn settings(choice: u8) -> SceneSettings {
+    let mut settings = SceneSettings::default();
     settings.strict = choice & 4 != 0;
     if choice & 8 != 0 {
         settings.emit.push(("a".into(), Rgb::new(15.0, 0.0, 1e-300)));
@@ -92,7 +92,7 @@ fn settings(choice: u8) -> ObjSettings {
 /// One short line that begins with the file, and has the three parts `place: found; remedy`.
 pub fn check_error(e: &Error) {
     let message = e.to_string();
-    let files = ["it.obj", "it.stl", NAMES[0], NAMES[2]];
+    let files = ["it.obj", "it.stl", "it.glb", NAMES[0], NAMES[2]];
     assert!(files.iter().any(|name| e.place().starts_with(name)), "{message}");
     assert!(matches!(e.kind(), ErrorKind::Scene | ErrorKind::File), "{message}");
     let parts = message.strip_prefix(e.place()).and_then(|m| m.strip_prefix(": "));
@@ -139,7 +139,7 @@ fn check_textures(scene: &Scene, t: usize) {
 }
 
 /// A few shots of rays from elements of some size, and their light at the vertices.
-fn settle(scene: &Scene) {
+pub fn settle(scene: &Scene) {
     let mesh = match Mesh::new(scene.clone(), scene.bounds().diagonal() / 4.0) {
         Ok(mesh) => mesh,
         Err(_) => return,

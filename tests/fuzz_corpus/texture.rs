@@ -3,7 +3,7 @@
 //! An input is a byte of options, three places in texture space, and an image of any kind.
 
 use radiosity::glam::DVec2;
-use radiosity::io::read_obj;
+use radiosity::io::read_scene;
 use radiosity::scene::texture::TextureMap;
 
 /// A triangle that has the image for its texture; options come before its name.
@@ -19,7 +19,7 @@ pub fn try_texture(input: &[u8]) -> bool {
     let clamp = if head[0] & 1 == 0 { "" } else { "-clamp on " };
     let library = format!("newmtl a\nKd 0.5 1 0.25\nmap_Kd {clamp}-s 1 -1 -o 0.5 i.tga\n");
     let files = [("m.mtl", library.as_bytes()), ("i.tga", image)];
-    let scene = read_obj("it.obj", OBJ.as_bytes(), &files).expect("an image is never an error");
+    let scene = read_scene("it.obj", OBJ.as_bytes(), &files).expect("an image is never an error");
     let Some(textures) = scene.textures(0) else { return false };
     let map = textures.reflectance.as_ref().expect("the one that it has");
     let [width, height] = map.texture.size();

@@ -7,7 +7,7 @@ use gltf::mesh::Semantic;
 use radiosity::glam::{DVec3, Quat, Vec3};
 use radiosity::io::ToneCurve;
 use radiosity::{
-    ErrorKind, GatheredMesh, Material, Mesh, Rgb, Scene, Triangle, load_obj, write_glb,
+    ErrorKind, GatheredMesh, Material, Mesh, Rgb, Scene, Triangle, load_scene, write_glb,
 };
 
 /// Two groups, the first of two materials, from `at` on; the light grows along x.
@@ -154,7 +154,7 @@ fn glb_that_cannot_be_written_is_an_error() {
 /// A light beyond floats, and none: numbers that glTF allows.
 #[test]
 fn glb_has_finite_numbers_for_any_light() {
-    let scene = load_obj(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")).unwrap();
+    let scene = load_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj")).unwrap();
     let mesh = Mesh::new(scene, 200.0).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");

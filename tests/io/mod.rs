@@ -3,6 +3,8 @@ mod blender;
 mod glb;
 mod glb_frame;
 mod glb_sides;
+#[cfg(feature = "glb")]
+mod gltf;
 mod image;
 #[cfg(feature = "textures")]
 mod masks;

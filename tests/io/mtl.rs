@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use radiosity::io::SpecularSurfaces;
 use radiosity::scene::{Specular, WarningKind};
-use radiosity::{ErrorKind, ObjSettings, Rgb};
+use radiosity::{ErrorKind, Rgb, SceneSettings};
 
 use super::obj_texts::{
     CHALK, SQUARE, load, load_strictly, obj, oddities, refused, repaired, warned, with_library,
@@ -114,7 +114,7 @@ fn unusable_statements_are_passed_over() {
 fn warns_of_unmodelled_material_properties() {
     let scene = with_library("newmtl chalk\nKs 1 1 1\n").unwrap();
     assert_eq!(scene.material(0).reflectance.to_array(), [0.5; 3]);
-    warned(&scene, "neither `Kd` nor `Ke`");
+    warned(&scene, "neither colour nor emission");
     let lamp = with_library("newmtl chalk\nKe 1 1 1\n").unwrap();
     assert_eq!(lamp.material(0).reflectance.to_array(), [0.0; 3]);
     assert!(lamp.warnings().is_empty());
@@ -185,7 +185,7 @@ fn mirrors_and_glass_may_be_diffuse_black_or_ignored() {
     let (text, library) = (room(), "newmtl chalk\nKd 0.3\nKe 1\nillum 9\nd 0.5\n");
     let files = chalk_files(&text, library);
     let with = |specular| {
-        let mut settings = ObjSettings::default();
+        let mut settings = SceneSettings::default();
         settings.specular = specular;
         settings.read("room.obj", files[0].1, &files[1..]).unwrap()
     };

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use radiosity::backend::cpu::RayGather;
 use radiosity::gather::{RefinementSettings, gather_at_vertices};
-use radiosity::io::read_obj;
-use radiosity::{ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb, VertexMesh, load_obj};
+use radiosity::io::read_scene;
+use radiosity::{ErrorKind, GatheredMesh, Mesh, Rgb, SceneSettings, VertexMesh, load_scene};
 use tempfile::TempDir;
 
 use super::obj_texts::load_strictly;
@@ -18,18 +18,18 @@ use crate::common::keep_going;
 #[test]
 fn rejects_unreadable_files() {
     let folder = TempDir::new().unwrap();
-    let missing = load_obj(folder.path().join("attic.obj"));
+    let missing = load_scene(folder.path().join("attic.obj"));
     let source = std::error::Error::source(missing.as_ref().unwrap_err()).unwrap();
     let source = source.downcast_ref::<std::io::Error>().unwrap();
     assert_eq!(source.kind(), std::io::ErrorKind::NotFound);
     refused(missing, ErrorKind::File, "attic.obj", &[]);
-    refused(load_obj(folder.path()), ErrorKind::File, &name_of(folder.path()), &["folder"]);
-    refused(load_obj(""), ErrorKind::File, "", &["cannot be read"]);
+    refused(load_scene(folder.path()), ErrorKind::File, &name_of(folder.path()), &["folder"]);
+    refused(load_scene(""), ErrorKind::File, "", &["cannot be read"]);
     // Opens, but cannot be read from its start.
     #[cfg(target_os = "linux")]
-    refused(load_obj("/proc/self/mem"), ErrorKind::File, "/proc/self/mem", &["cannot be read"]);
+    refused(load_scene("/proc/self/mem"), ErrorKind::File, "/proc/self/mem", &["cannot be read"]);
     #[cfg(unix)]
-    refused(load_obj(Path::new("/dev/zero")), ErrorKind::File, "/dev/zero", &["regular"]);
+    refused(load_scene(Path::new("/dev/zero")), ErrorKind::File, "/dev/zero", &["regular"]);
 }
 
 #[test]
@@ -43,24 +43,27 @@ fn rejects_files_that_are_too_large() {
         path
     };
     let large = hollow("large.obj", MOST + 1);
-    refused(load_obj(large), ErrorKind::File, "large.obj", &["more than 1073741824 bytes"]);
+    refused(load_scene(large), ErrorKind::File, "large.obj", &["more than 1073741824 bytes"]);
     // The first library leaves less for the second.
     fs::write(folder.path().join("chalk.mtl"), CHALK).unwrap();
     hollow("large.mtl", MOST);
     let room = folder.path().join("room.obj");
     fs::write(&room, "mtllib chalk.mtl\nmtllib large.mtl\n").unwrap();
     let left = format!("more than {} bytes", MOST - CHALK.len() as u64);
-    refused(load_obj(&room), ErrorKind::File, "room.obj:2", &["'large.mtl'", &left]);
+    refused(load_scene(&room), ErrorKind::File, "room.obj:2", &["'large.mtl'", &left]);
 }
 
 #[test]
 fn scenes_from_memory() {
     let text = format!("mtllib paints/a b.mtl\n{SQUARE}usemtl chalk\nf 1 2 3 4\n");
     let library = ("paints/a b.mtl", CHALK.as_bytes());
-    let scene = read_obj("room.obj", text.as_bytes(), &[library]).unwrap();
+    let scene = read_scene("room.obj", text.as_bytes(), &[library]).unwrap();
     assert_eq!((area(&scene), &*scene.material(0).name), (1.0, "chalk"));
-    warned(&read_obj("room.obj", text.as_bytes(), &[]).unwrap(), "no .mtl file ('paints/a b.mtl')");
-    let other = read_obj("room.obj", text.as_bytes(), &[("c.mtl", b"")]).unwrap();
+    warned(
+        &read_scene("room.obj", text.as_bytes(), &[]).unwrap(),
+        "no .mtl file ('paints/a b.mtl')",
+    );
+    let other = read_scene("room.obj", text.as_bytes(), &[("c.mtl", b"")]).unwrap();
     warned(&other, "has 'c.mtl' ('paints/a b.mtl')");
 }
 
@@ -256,7 +259,7 @@ fn repeated_group_is_one_group() {
 fn facets_are_groups_in_the_order_of_the_file() {
     let long = "x".repeat(80);
     let text = format!("{SQUARE}g a\nf 1 2 3\ng {long}\nf 1 2 3 4\ng a\nf 1 3 4\nf 2 3 4\n");
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.facets = true;
     let scene = settings.read("square.obj", text.as_bytes(), &[]).unwrap();
     // A name that is too long to be there once a face is told by its number.

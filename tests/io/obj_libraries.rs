@@ -3,7 +3,7 @@
 use std::fs;
 
 use radiosity::scene::WarningKind;
-use radiosity::{ErrorKind, load_obj};
+use radiosity::{ErrorKind, load_scene};
 use tempfile::TempDir;
 
 use super::obj_texts::{
@@ -38,7 +38,7 @@ fn library_is_looked_for_below_the_folder_only() {
     }
     let load = |library: &str| {
         fs::write(&room, format!("{SQUARE}mtllib {library}\nusemtl chalk\nf 1 2 3\n")).unwrap();
-        load_obj(&room).unwrap()
+        load_scene(&room).unwrap()
     };
     let as_written = ["chalk.mtl", "./chalk.mtl", "Paints/paint.mtl", "Paints/./paint.mtl"];
     for inside in as_written {
@@ -82,14 +82,14 @@ fn libraries_that_are_no_files_are_missing() {
     let room = folder.path().join("room.obj");
     fs::write(&room, format!("mtllib it.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
     fs::create_dir(folder.path().join("it.mtl")).unwrap();
-    warned(&load_obj(&room).unwrap(), "1 missing library, at ");
+    warned(&load_scene(&room).unwrap(), "1 missing library, at ");
     fs::remove_dir(folder.path().join("it.mtl")).unwrap();
     // Nobody will ever write to it.
     #[cfg(unix)]
     {
         let pipe = folder.path().join("it.mtl");
         assert!(std::process::Command::new("mkfifo").arg(pipe).status().unwrap().success());
-        warned(&load_obj(&room).unwrap(), "1 missing library, at ");
+        warned(&load_scene(&room).unwrap(), "1 missing library, at ");
     }
 }
 

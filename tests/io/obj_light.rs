@@ -4,20 +4,20 @@
 use std::f64::consts::PI;
 
 use radiosity::scene::WarningKind;
-use radiosity::{Error, ErrorKind, Material, ObjSettings, Rgb, Scene};
+use radiosity::{Error, ErrorKind, Material, Rgb, Scene, SceneSettings};
 
 use super::obj_texts::{SQUARE, refused, warned};
 use crate::common::textured::tga;
 
 /// A wall and a lamp, with this library.
-fn room(library: &str, settings: &ObjSettings) -> Result<Scene, Error> {
+fn room(library: &str, settings: &SceneSettings) -> Result<Scene, Error> {
     let text =
         format!("mtllib room.mtl\n{SQUARE}usemtl wall\nf 1 2 3\nusemtl Ceiling Lamp\nf 1 3 4\n");
     settings.read("room.obj", text.as_bytes(), &[("room.mtl", library.as_bytes())])
 }
 
-fn emitting(emit: &[(&str, f64)]) -> ObjSettings {
-    let mut settings = ObjSettings::default();
+fn emitting(emit: &[(&str, f64)]) -> SceneSettings {
+    let mut settings = SceneSettings::default();
     settings.emit = emit.iter().map(|&(name, l)| (name.into(), Rgb::splat(l))).collect();
     settings
 }
@@ -30,18 +30,18 @@ fn kinds(scene: &Scene) -> Vec<WarningKind> {
 fn ambient_above_one_is_light_where_nothing_else_is() {
     let wall = "newmtl wall\nKd 0.5\nKa 1 1 1\n";
     let lamp = "newmtl Ceiling Lamp\nKd 0.5\nKa 20 10 0\n";
-    let scene = room(&format!("{wall}{lamp}Ke 0 0 0\n"), &ObjSettings::default()).unwrap();
+    let scene = room(&format!("{wall}{lamp}Ke 0 0 0\n"), &SceneSettings::default()).unwrap();
     assert_eq!(scene.material(0).exitance, Rgb::ZERO);
     assert_eq!(scene.material(1).exitance, PI * Rgb::new(20.0, 10.0, 0.0));
     assert_eq!(kinds(&scene), [WarningKind::AmbientAsRadiance]);
     warned(&scene, "room.mtl:4");
-    let mut strict = ObjSettings::default();
+    let mut strict = SceneSettings::default();
     strict.strict = true;
     let refusal = room(&format!("{wall}{lamp}"), &strict);
     refused(refusal, ErrorKind::Scene, "room.mtl:4", &["`Ka` above 1", "`Ke`"]);
     // Another light, in the file or of the caller's; a colour in other units; no more than white.
     let dim = emitting(&[("wall", 1.0)]);
-    let other = ObjSettings::default();
+    let other = SceneSettings::default();
     let units = lamp.replace("Kd 0.5", "Kd 255 255 255");
     for (library, settings) in [
         (format!("{wall}{lamp}newmtl third\nKe 1 1 1\n"), &other),
@@ -75,7 +75,7 @@ fn caller_says_what_emits() {
 
 #[test]
 fn ceiling_is_the_callers() {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.max_reflectance = 0.9;
     let scene = room("newmtl wall\nKd 1 0.95 0.5\n", &settings).unwrap();
     assert_eq!(scene.material(0).reflectance.to_array(), [0.9, 0.95, 0.5]);
@@ -87,7 +87,8 @@ fn ceiling_is_the_callers() {
 
 #[test]
 fn without_light_names_candidates() {
-    let dark = room("newmtl wall\nKd 0.5\nnewmtl Ceiling Lamp\nKd 0.5\n", &ObjSettings::default());
+    let dark =
+        room("newmtl wall\nKd 0.5\nnewmtl Ceiling Lamp\nKd 0.5\n", &SceneSettings::default());
     let dark = dark.unwrap();
     let warning = dark.warnings().iter().find(|w| w.kind == WarningKind::NoLight).unwrap();
     assert_eq!(warning.names, ["Ceiling Lamp"]);
@@ -103,14 +104,14 @@ fn without_light_names_candidates() {
         ("wall", false),
     ] {
         let text = format!("{SQUARE}usemtl {name}\nf 1 2 3\n");
-        let scene = ObjSettings::default().read("room.obj", text.as_bytes(), &[]).unwrap();
+        let scene = SceneSettings::default().read("room.obj", text.as_bytes(), &[]).unwrap();
         let warning = scene.warnings().iter().find(|w| w.kind == WarningKind::NoLight).unwrap();
         assert_eq!(warning.names.len(), usize::from(is_light), "{name}");
     }
 }
 
-fn transmitting(transmit: &[(&str, [f64; 3])]) -> ObjSettings {
-    let mut settings = ObjSettings::default();
+fn transmitting(transmit: &[(&str, [f64; 3])]) -> SceneSettings {
+    let mut settings = SceneSettings::default();
     settings.transmit = transmit.iter().map(|&(name, tau)| (name.into(), tau.into())).collect();
     settings
 }

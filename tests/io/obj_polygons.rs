@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use radiosity::{Mesh, Rgb, VertexMesh, load_obj};
+use radiosity::{Mesh, Rgb, VertexMesh, load_scene};
 
 use super::obj_texts::{SQUARE, area, obj, repaired, warned};
 use crate::common::framed::{Frame, HERE};
@@ -22,7 +22,7 @@ fn polygons_are_cut_alike_anywhere() {
             let text: String = (0..outline.len()).map(corner).collect();
             let path = folder.path().join("l.obj");
             std::fs::write(&path, text + "f 1 2 3 4 5 6 7 8\n").unwrap();
-            let scene = load_obj(&path).unwrap();
+            let scene = load_scene(&path).unwrap();
             let area: f64 = (0..scene.triangles().len()).map(|t| scene.area(t)).sum();
             // Steps of 2e-10, some of them around an outline of 8.
             assert!((area / frame.scale.powi(2) - 3.0).abs() < 1e-8, "{frame:?} {first}: {area}");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use radiosity::scene::WarningKind;
-use radiosity::{Error, ErrorKind, ObjSettings, Scene, load_obj};
+use radiosity::{Error, ErrorKind, Scene, SceneSettings, load_scene};
 use tempfile::TempDir;
 
 pub const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -17,12 +17,12 @@ pub fn load(files: &[(&str, &[u8])]) -> Result<Scene, Error> {
     for (name, bytes) in files {
         fs::write(folder.path().join(name), bytes).unwrap();
     }
-    load_obj(folder.path().join(files[0].0))
+    load_scene(folder.path().join(files[0].0))
 }
 
 /// The same, refusing what would be repaired.
 pub fn load_strictly(files: &[(&str, &[u8])]) -> Result<Scene, Error> {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.strict = true;
     settings.read(files[0].0, files[0].1, &files[1..])
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use radiosity::glam::DVec2;
 use radiosity::scene::WarningKind;
-use radiosity::{ObjSettings, Rgb, Scene, load_obj};
+use radiosity::{Rgb, Scene, SceneSettings, load_scene};
 use tempfile::TempDir;
 
 use super::obj_texts::{SQUARE, load, oddities, repaired};
@@ -123,7 +123,7 @@ fn file_of_an_image_may_have_256_mib() {
     fs::write(folder.path().join("room.mtl"), "newmtl wall\nKd 0.3\nmap_Kd a.png\n").unwrap();
     // With a hole, so that it takes no room on the disk.
     fs::File::create(folder.path().join("a.png")).unwrap().set_len((1 << 28) + 1).unwrap();
-    let scene = load_obj(folder.path().join("room.obj")).unwrap();
+    let scene = load_scene(folder.path().join("room.obj")).unwrap();
     assert_eq!(oddities(&scene), [WarningKind::LargeTexture]);
     let warning = scene.warnings()[0].to_string();
     assert!(warning.contains("more than 268435456 bytes"), "{warning}");
@@ -190,13 +190,13 @@ fn images_that_claim_too_much_or_are_none_are_not_read() {
     ] {
         let files: [(&str, &[u8]); 3] =
             [("room.obj", text.as_bytes()), ("room.mtl", library), ("a.png", &bytes)];
-        let scene = ObjSettings::default().read("room.obj", files[0].1, &files[1..]).unwrap();
+        let scene = SceneSettings::default().read("room.obj", files[0].1, &files[1..]).unwrap();
         assert_eq!(oddities(&scene), [kind], "{} {:?}", bytes.len(), scene.warnings());
         let warning = scene.warnings()[0].to_string();
         assert!(warning.contains(reason) && warning.contains("`Kd` and `Ke` count"), "{warning}");
         assert!(warning.contains("room.mtl:1") && warning.contains("'a.png'"), "{warning}");
         assert_eq!(scene.material(0).reflectance.to_array(), [0.3; 3]);
-        let mut strict = ObjSettings::default();
+        let mut strict = SceneSettings::default();
         strict.strict = true;
         let refused = strict.read("room.obj", files[0].1, &files[1..]).unwrap_err().to_string();
         assert!(refused.contains("room.mtl:1") && refused.contains("a.png"), "{refused}");

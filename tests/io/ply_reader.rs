@@ -1,6 +1,6 @@
 //! PLY files read: those the crate writes, those of others, and those that nobody should.
 
-use radiosity::{ErrorKind, Rgb, VertexMesh, load_obj, read_ply, write_ply};
+use radiosity::{ErrorKind, Rgb, VertexMesh, load_scene, read_ply, write_ply};
 use tempfile::TempDir;
 
 use crate::common::framed::{self, Frame};
@@ -146,5 +146,5 @@ fn hostile_files_are_refused_at_once() {
     refused(&[0xff; 5000], &[]);
     let error = read_ply("no/such.ply").unwrap_err();
     assert_eq!((error.kind(), error.place()), (ErrorKind::File, "no/such.ply"));
-    assert!(load_obj("no/such.ply").is_err() && read_ply("/").is_err());
+    assert!(load_scene("no/such.ply").is_err() && read_ply("/").is_err());
 }

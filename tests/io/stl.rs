@@ -1,4 +1,4 @@
-use radiosity::io::{ObjSettings, read_obj};
+use radiosity::io::{SceneSettings, read_scene};
 use radiosity::scene::WarningKind;
 use radiosity::{ErrorKind, Scene};
 
@@ -25,7 +25,7 @@ ENDSOLID
 ";
 
 fn read(bytes: &[u8]) -> Scene {
-    read_obj("part.STL", bytes, &[]).unwrap()
+    read_scene("part.STL", bytes, &[]).unwrap()
 }
 
 /// A binary file of these triangles, normal and corners each, that says there are `count`.
@@ -65,7 +65,7 @@ fn binary_files_have_a_group_of_their_name() {
     let scene = read(&binary(&[UP, UP.map(|[x, y, z]| [x, y, z + 1.0])], 2));
     assert_eq!((scene.groups(), scene.triangles().len()), (&["part".to_string()][..], 2));
     assert_eq!(scene.corners(0)[0].z, 0.1);
-    let mut facets = ObjSettings::default();
+    let mut facets = SceneSettings::default();
     facets.facets = true;
     let scene = facets.read("part.stl", &binary(&[UP, UP], 2), &[]).unwrap();
     assert_eq!(scene.groups(), ["part/1", "part/2"]);
@@ -80,7 +80,7 @@ fn counts_that_are_wrong_are_said() {
         let scene = read(&bytes);
         assert_eq!(scene.triangles().len(), expected);
         assert!(kinds(&scene).contains(&WarningKind::BrokenOff));
-        let mut strict = ObjSettings::default();
+        let mut strict = SceneSettings::default();
         strict.strict = true;
         let error = strict.read("part.stl", &bytes, &[]).unwrap_err();
         assert!(error.to_string().contains("give the whole file"), "{error}");
@@ -124,7 +124,7 @@ fn what_cannot_be_meant_is_refused_with_its_place() {
         (box_of_obj, "neither a facet nor a binary header"),
         (vec![], "neither a facet nor a binary header"),
     ] {
-        let error = read_obj("part.STL", &bytes, &[]).unwrap_err();
+        let error = read_scene("part.STL", &bytes, &[]).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Scene);
         assert!(error.to_string().contains(found), "{error}");
     }

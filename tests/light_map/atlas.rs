@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use radiosity::light_map::{Atlas, Coordinates, Resolution, Unusable};
 use radiosity::scene::Sides;
-use radiosity::{ErrorKind, ObjSettings, Scene};
+use radiosity::{ErrorKind, Scene, SceneSettings};
 
 use crate::common::cornell_box;
 
@@ -19,7 +19,7 @@ fn scene(third: &str) -> Scene {
 }
 
 fn read(text: &str) -> Scene {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.texture_coordinates = true;
     settings.sides = Sides::Front;
     settings.read("scene.obj", text.as_bytes(), &[]).unwrap()
@@ -44,7 +44,7 @@ fn coordinates_of_the_file_are_kept_with_v_downwards() {
     assert!((atlas.texel_size() - 0.1).abs() < 1e-12);
     // Unless asked for, coordinates that nobody needs are not kept.
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
-    let scene = ObjSettings::default().read("a.obj", text.as_bytes(), &[]).unwrap();
+    let scene = SceneSettings::default().read("a.obj", text.as_bytes(), &[]).unwrap();
     assert_eq!(scene.texture_coordinates(0), None);
 }
 

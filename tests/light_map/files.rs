@@ -9,7 +9,7 @@ use radiosity::io::{
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::scene::Sides;
-use radiosity::{ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb};
+use radiosity::{ErrorKind, GatheredMesh, Mesh, Rgb, SceneSettings};
 
 use crate::common::keep_counting;
 
@@ -24,7 +24,7 @@ fn map(with_coordinates: bool, at: f64) -> LightMap {
          g floor\nusemtl grey\nf 1/1 2/2 3/3 4/4\ng top\nusemtl lamp\n{lamp}\n",
         x[0], x[1]
     );
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.texture_coordinates = true;
     settings.sides = Sides::Front;
     settings.emit.push(("lamp".into(), Rgb::new(1.0, 2.0, 3.0)));

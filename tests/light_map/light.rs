@@ -10,7 +10,7 @@ use radiosity::gather::{GatherPoint, IrradianceSample, RadiosityField};
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::scene::Sides;
 use radiosity::{
-    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, ObjSettings, Rgb, Scene, Triangle,
+    Error, ErrorKind, Gather, GatheredMesh, Material, Mesh, Rgb, Scene, SceneSettings, Triangle,
 };
 
 use crate::common::scenes::{facing_down, facing_up, grey, lamp, standing_block, walls};
@@ -93,7 +93,7 @@ fn texels_have_the_light_of_their_places() {
     let text = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 1.5 0.6 0.5\nv 1.5 0.9 0.5\nv 1.9 0.9 0.5\n\
         v 1.9 0.6 0.5\nvt 0 0\nvt 0.8 0\nvt 0.8 0.4\nvt 0 0.4\nvt 0.8 0.8\nvt 0.8 0.9\nvt 0.9 0.9\n\
         vt 0.9 0.8\nusemtl floor\nf 1/1 2/2 3/3 4/4\nusemtl lamp\nf 5/5 6/6 7/7 8/8\n";
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.texture_coordinates = true;
     settings.sides = Sides::Front;
     settings.emit.push(("lamp".into(), Rgb::new(1.0, 2.0, 3.0)));

@@ -10,7 +10,7 @@ use radiosity::backend::cpu::RayGather;
 use radiosity::io::{ToneCurve, write_light_map_glb};
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::scene::Sides;
-use radiosity::{GatheredMesh, Mesh, ObjSettings, Rgb, Scene};
+use radiosity::{GatheredMesh, Mesh, Rgb, Scene, SceneSettings};
 
 use crate::common::keep_counting;
 use crate::common::textured::tga;
@@ -30,7 +30,7 @@ fn map(tiles: &str) -> LightMap {
     );
     let image = tga(2, &[[128; 3], [255, 0, 0]]);
     let files: [(&str, &[u8]); 2] = [("box.mtl", library.as_bytes()), ("a.tga", &image)];
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sides = Sides::Front;
     of_scene(settings.read("box.obj", BOX.as_bytes(), &files).unwrap())
 }
@@ -217,7 +217,7 @@ fn panes_are_transparent() {
 #[test]
 fn two_sides_lie_apart() {
     let text = "v 0 0 0\nv 4 0 0\nv 0 3 0\nf 1 2 3\nf 1 3 2\n";
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sides = Sides::Front;
     let map = of_scene(settings.read("a.obj", text.as_bytes(), &[]).unwrap());
     let file = File::of(&map, &ToneCurve::fit(&map.radiosity()));

@@ -80,7 +80,7 @@ fn paths_correct_probes_in_light_that_is_wrong() {
 #[test]
 fn sphere_is_lit_as_by_gathering_at_its_points() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let scene = radiosity::load_obj(path).unwrap();
+    let scene = radiosity::load_scene(path).unwrap();
     let settings = BakeSettings::elements_only(&scene);
     let light = settings.bake(scene, &Backend::Cpu, keep_going).unwrap().light;
     let positions = [DVec3::new(278.0, 273.0, 100.0), DVec3::new(120.0, 420.0, 300.0)];
@@ -132,7 +132,7 @@ fn probes_in_solids_are_marked() {
 #[test]
 fn probes_do_not_depend_on_their_order_or_threads() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let light = even_light(radiosity::load_obj(path).unwrap(), 30.0);
+    let light = even_light(radiosity::load_scene(path).unwrap(), 30.0);
     let at = |k: u32| DVec3::new(5.0 * f64::from(k), 200.0, 100.0);
     let places: Vec<DVec3> = (1..50).map(at).collect();
     let all = probes(&light, 0.1, &places);

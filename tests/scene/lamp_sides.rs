@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use radiosity::scene::{Sides, WarningKind};
-use radiosity::{Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, VertexMesh};
+use radiosity::{Backend, BakeTarget, Material, Rgb, Scene, SceneSettings, VertexMesh};
 
 use crate::common::keep_going;
 use crate::common::scenes::{Quad, block, facing_down, facing_up, paint, quads, walls};
@@ -72,7 +72,7 @@ fn lamps_whose_backs_see_nothing_are_not_said() {
 
 /// The scene as its sides are given by a file, with light from `emit_both_sides`.
 fn from_file(text: &str, both: bool) -> Scene {
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.emit_both_sides = both;
     let library: &[u8] = b"newmtl lamp\nKd 0.1\nKe 1 2 3\nnewmtl grey\nKd 0.5\n";
     settings.read("a.obj", text.as_bytes(), &[("a.mtl", library)]).unwrap().resolve_sides()

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use radiosity::scene::{Sides, WarningKind};
 use radiosity::{
-    Backend, BakeTarget, Material, ObjSettings, Rgb, Scene, Sky, Sun, Triangle, VertexMesh,
-    load_obj,
+    Backend, BakeTarget, Material, Rgb, Scene, SceneSettings, Sky, Sun, Triangle, VertexMesh,
+    load_scene,
 };
 
 use crate::common::keep_going;
@@ -105,13 +105,13 @@ fn the_end_of_a_tunnel_faces_as_its_walls_do() {
 #[test]
 fn scenes_wound_right_stay_as_they_are() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-    let given = load_obj(path).unwrap();
+    let given = load_scene(path).unwrap();
     assert!(given.materials().iter().all(|m| m.sides == Sides::Auto));
     let found = given.resolve_sides();
     assert_eq!(found.triangles(), given.triangles());
     assert!(found.warnings().is_empty() && found.materials().len() == given.materials().len());
     assert!(found.materials().iter().all(|m| m.sides == Sides::Front));
-    let mut front = ObjSettings::default();
+    let mut front = SceneSettings::default();
     front.sides = Sides::Front;
     assert!(front.load(path).unwrap().materials().iter().all(|m| m.sides == Sides::Front));
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use radiosity::backend::cpu::RayRows;
-use radiosity::io::read_obj;
+use radiosity::io::read_scene;
 use radiosity::{Mesh, Solution, Solver, VertexMesh};
 
 use crate::common::keep_going;
@@ -12,7 +12,7 @@ const MATERIALS: &[u8] = b"newmtl lamp\nKe 1\nnewmtl rock\nKd 0.5\n";
 
 /// Loads `obj`, shoots `shots` times, and gives what came out.
 fn bake(obj: &str, shots: u64) -> (Mesh, Solution) {
-    let scene = read_obj("it.obj", obj.as_bytes(), &[("it.mtl", MATERIALS)]).unwrap();
+    let scene = read_scene("it.obj", obj.as_bytes(), &[("it.mtl", MATERIALS)]).unwrap();
     let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
     let mut rays = RayRows::new(&mesh, 4096).unwrap();
     let solver = Solver { max_steps: Some(shots), ..Default::default() };

@@ -1,7 +1,7 @@
 //! View factors against an independent list of cases.
 
 use glam::DVec3;
-use radiosity::{Scene, ViewFactors, load_obj};
+use radiosity::{Scene, ViewFactors, load_scene};
 use serde_json::Value;
 
 use crate::common::view_factors::{data, exact_view_factors, group_index};
@@ -22,7 +22,7 @@ fn independent_cases_match() {
         // Over a hundred thousand pairs with a sphere in between: looser, for the time it takes.
         let error = if obj == "ovf-concentric-spheres-004.obj" { 1e-2 } else { 1e-4 };
         if known.as_ref().is_none_or(|(name, _)| *name != obj) {
-            let scene = load_obj(data("view_factors").join(&obj)).unwrap();
+            let scene = load_scene(data("view_factors").join(&obj)).unwrap();
             known = Some((obj.clone(), exact_view_factors(&scene, error)));
         }
         let Some((_, m)) = &known else { unreachable!() };
@@ -55,7 +55,7 @@ fn independent_cases_match() {
 fn nearly_planar_corners_change_little() {
     // A closed room with a box in it, its corners moved by as little as rounding and as much as a
     // file of six digits does: walls are no longer plane, and stand before themselves by as much.
-    let scene = load_obj(data("view_factors/occ-box-offset-w_x0-b_x0.obj")).unwrap();
+    let scene = load_scene(data("view_factors/occ-box-offset-w_x0-b_x0.obj")).unwrap();
     let plain = exact_view_factors(&scene, 1e-4);
     for (seed, move_by) in (0..).zip((0..=24).map(|k| 10f64.powf(-16.0 + 0.5 * f64::from(k)))) {
         let mut state = 88_172_645_463_325_252_u64 + seed;

@@ -4,7 +4,7 @@ use radiosity::form_factor::{Entry, Row};
 use radiosity::mesh::NodeId;
 use radiosity::scene::Sides;
 use radiosity::solver::{Method, StopReason};
-use radiosity::{Error, FormFactors, Mesh, ObjSettings, Rgb, Scene, Solution, Solver};
+use radiosity::{Error, FormFactors, Mesh, Rgb, Scene, SceneSettings, Solution, Solver};
 
 use crate::common::changes::{assert_balanced, by_elements, same_rays};
 use crate::common::cut_outs::{Lattice, Part, read};
@@ -51,7 +51,7 @@ fn furnace(reflectance: f64, through: f64) -> Scene {
         "newmtl wall\nKd {all}\nKe {ke}\nnewmtl sheet\nKd {all}\nKe {ke}\nmap_d mask.tga\n\
          newmtl back\nKd {all}\nKe {ke}\nmap_d mask.tga\n"
     );
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     settings.sides = Sides::Front;
     if through > 0.0 {
         settings.transmit = ["sheet", "back"].map(|m| (m.into(), Rgb::splat(through))).into();
@@ -155,7 +155,7 @@ fn states_know_the_holes() {
     let one = |mask: &Lattice| {
         let parts = [(facing_up([0.0, 1.0], [0.0, 1.0], 0.5), "sheet")];
         let images = [("mask.tga", &mask.image()[..])];
-        Mesh::new(read(&parts, text, &images, &ObjSettings::default()), 2.0).unwrap()
+        Mesh::new(read(&parts, text, &images, &SceneSettings::default()), 2.0).unwrap()
     };
     let [mesh, other] = [&MASK, &moved].map(one);
     let mut begun = solver.begin(&mesh).unwrap();

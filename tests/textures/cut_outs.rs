@@ -7,7 +7,7 @@ use gltf::material::AlphaMode;
 use radiosity::backend::cpu::RayGather;
 use radiosity::io::ToneCurve;
 use radiosity::scene::Sides;
-use radiosity::{Camera, GatheredMesh, Mesh, ObjSettings, Rgb, Scene, write_glb};
+use radiosity::{Camera, GatheredMesh, Mesh, Rgb, Scene, SceneSettings, write_glb};
 
 use crate::common::cut_outs::{Lattice, Part, read};
 use crate::common::keep_counting;
@@ -27,7 +27,7 @@ fn sheet_above_ground(sheet: &str) -> (Scene, [Rgb; 2]) {
     let library = format!("newmtl ground\nKd 0.5\nnewmtl sheet\nKd 0.5\n{sheet}\n");
     let colours = tga(2, &[[255, 0, 0], [0, 255, 0], [0, 0, 255], [255; 3]]);
     let images = [("mask.tga", &MASK.image()[..]), ("a.tga", &colours[..])];
-    let mut settings = ObjSettings::default();
+    let mut settings = SceneSettings::default();
     (settings.sides, settings.sky) = (Sides::Front, Some(SKY.into()));
     let scene = read(&parts, &library, &images, &settings);
     (scene, [Rgb::new(3.0, 1.0, 2.0), Rgb::new(0.5, 4.0, 1.0)])

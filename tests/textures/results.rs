@@ -8,7 +8,7 @@ use radiosity::glam::{DVec3, Vec3};
 use radiosity::io::ToneCurve;
 use radiosity::verify::{Settings, verify};
 use radiosity::{
-    Backend, BakeTarget, ErrorKind, GatheredMesh, Mesh, ObjSettings, Rgb, Scene, VertexMesh,
+    Backend, BakeTarget, ErrorKind, GatheredMesh, Mesh, Rgb, Scene, SceneSettings, VertexMesh,
     read_ply, write_glb, write_ply,
 };
 
@@ -214,7 +214,7 @@ fn vertices_on_seams_are_written_for_both_sides() {
     let image = tga(2, &[RED, GREEN]);
     let library: &[u8] = b"newmtl wall\nKd 0.5\nmap_Kd a.tga";
     let files = [("box.mtl", library), ("a.tga", &image)];
-    let scene = ObjSettings::default().read("box.obj", text.as_bytes(), &files).unwrap();
+    let scene = SceneSettings::default().read("box.obj", text.as_bytes(), &files).unwrap();
     let mesh = Mesh::new(scene, f64::INFINITY).unwrap();
     let light = GatheredMesh::from_elements(&mesh, &[Rgb::ONE; 4]).unwrap();
     assert_eq!(light.surface.positions.len(), 6);

@@ -7,7 +7,7 @@ use glam::DVec3;
 use radiosity::form_factor::closed_form::{point_to_polygon, polygon_to_polygon};
 use radiosity::io::view_factors::{write_csv_list, write_matrix_market};
 use radiosity::view_factor::{Estimate, Factor, MatrixRows, Missing, backs_met};
-use radiosity::{ErrorKind, Scene, ViewFactors, load_obj};
+use radiosity::{ErrorKind, Scene, ViewFactors, load_scene};
 use serde_json::Value;
 
 use super::sparse::{of_triangles, revolved};
@@ -26,7 +26,7 @@ fn independent_point_cases_match() {
         let vector =
             |key: &str| DVec3::from_array([0, 1, 2].map(|k| place[key][k].as_f64().unwrap()));
         let (point, normal) = (vector("point"), vector("normal"));
-        let scene = load_obj(data("view_factors").join(case["obj"].as_str().unwrap())).unwrap();
+        let scene = load_scene(data("view_factors").join(case["obj"].as_str().unwrap())).unwrap();
         let to = scene.groups().iter().position(|g| case["to"] == **g).unwrap();
         let of_group = |&t: &usize| scene.triangles()[t].group as usize == to;
         let triangles = (0..scene.triangles().len()).filter(of_group);
@@ -63,7 +63,7 @@ fn errors_that_share_a_sign_add_up() {
 /// A cube with a box inside, walls 4 × 4: 120 groups, every entry.
 #[test]
 fn enclosure_matrix_matches() {
-    let m = exact_view_factors(&load_obj(data("box_4.obj")).unwrap(), 1e-4);
+    let m = exact_view_factors(&load_scene(data("box_4.obj")).unwrap(), 1e-4);
     let truth = std::fs::read_to_string(data("box_4.csv")).unwrap();
     let mut rows = 0;
     for line in truth.lines().filter(|l| !l.starts_with('#')) {
@@ -87,7 +87,7 @@ fn enclosure_matrix_matches() {
 
 #[test]
 fn occluders_only_reduce_factors() {
-    let scene = load_obj(data("view_factors/occ-box-offset-w_x0-b_x0.obj")).unwrap();
+    let scene = load_scene(data("view_factors/occ-box-offset-w_x0-b_x0.obj")).unwrap();
     let m = exact_view_factors(&scene, 1e-4);
     let mut less = 0;
     for (i, j) in (0..12).flat_map(|i| (0..i).map(move |j| (i, j))) {
@@ -110,7 +110,7 @@ fn occluders_only_reduce_factors() {
 
 #[test]
 fn factors_are_invariant_under_scale_and_shift() {
-    let scene = load_obj(data("view_factors/chap-plate-in-box-y0-y1.obj")).unwrap();
+    let scene = load_scene(data("view_factors/chap-plate-in-box-y0-y1.obj")).unwrap();
     let here = exact_view_factors(&scene, 1e-4);
     // The middle one is out by the rounding of coordinates, 1e3 · 2e-16.
     for (scale, shift, rounding) in [(1e-9, 0.0, 1e-13), (1.0, 1e3, 1e-11), (1e9, 0.0, 1e-13)] {
@@ -130,7 +130,7 @@ fn factors_are_invariant_under_scale_and_shift() {
 
 #[test]
 fn the_same_bits_on_every_run() {
-    let scene = load_obj(data("box_4.obj")).unwrap();
+    let scene = load_scene(data("box_4.obj")).unwrap();
     assert!(exact_view_factors(&scene, 1e-3) == exact_view_factors(&scene, 1e-3));
 }
 
@@ -235,7 +235,7 @@ fn triangulation_of_plate_does_not_matter() {
 fn long_floor_matches_closed_form() {
     // All that a small face gets of a floor five hundred times as long comes from next to it; a
     // wall stands between by rounding alone, so that the closed form is right all the same.
-    let scene = load_obj(data("long_room.obj")).unwrap();
+    let scene = load_scene(data("long_room.obj")).unwrap();
     let m = exact_view_factors(&scene, 1e-4);
     let quad = |name: &str| {
         let first = |t: &&radiosity::Triangle| t.group as usize == group_index(&m, name);

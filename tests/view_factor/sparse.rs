@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use radiosity::view_factor::{Estimate, Factor, Missing};
-use radiosity::{ErrorKind, Scene, Triangle, ViewFactors, load_obj};
+use radiosity::{ErrorKind, Scene, Triangle, ViewFactors, load_scene};
 
 use crate::common::scenes::{facing_down, facing_up, grey, quads, standing_block};
 use crate::common::view_factors::{data, exact_view_factors};
@@ -67,7 +67,7 @@ fn sizes_of_matrices_are_predicted() {
     // are large on one side only are counted by the other.
     assert!((predicted.factors as f64 / factors - 1.0).abs() < 0.15, "{factors} {predicted:?}");
     // An exact one has all pairs at most.
-    let scene = load_obj(data("box_4.obj")).unwrap();
+    let scene = load_scene(data("box_4.obj")).unwrap();
     let groups = scene.groups().len();
     assert_eq!(ViewFactors::predicted_size(&scene, 1e-3, &[]).unwrap().factors, groups * groups);
     assert!(ViewFactors::predicted_size(&scene, 0.0, &[]).is_err());
@@ -75,7 +75,7 @@ fn sizes_of_matrices_are_predicted() {
 
 #[test]
 fn enclosure_is_as_good_as_it_says() {
-    let scene = load_obj(data("box_4.obj")).unwrap();
+    let scene = load_scene(data("box_4.obj")).unwrap();
     let exact = exact_view_factors(&scene, 1e-4);
     for error in [1e-2, 1e-3] {
         let m = sparse(&scene, error, &[]);
@@ -127,7 +127,7 @@ fn ground_and_sky_are_seen_past_a_whole_town() {
 fn groups_of_many_polygons_and_both_sides_add_up() {
     // Two cylinders, one within the other, of 32 faces each; and a plate with two sides between
     // plates, whose back is met where it has one.
-    let cylinders = load_obj(data("view_factors/ovf-coaxial-cylinders-003.obj")).unwrap();
+    let cylinders = load_scene(data("view_factors/ovf-coaxial-cylinders-003.obj")).unwrap();
     let surfaces = [
         facing_up([0.0, 1.0], [0.0, 1.0], 0.0),
         facing_down([0.0, 1.0], [0.0, 1.0], 1.0),
@@ -261,7 +261,7 @@ fn chambers_see_each_other_through_their_neck() {
 
 #[test]
 fn rows_of_exact_matrix_are_its_rows() {
-    let scene = load_obj(data("box_4.obj")).unwrap();
+    let scene = load_scene(data("box_4.obj")).unwrap();
     let exact = exact_view_factors(&scene, 1e-3);
     let rows = ViewFactors::exact_rows(&scene, 1e-3, &[], &[3, 97], keep_counting);
     for (row, i) in rows.unwrap().unwrap().iter().zip([3, 97]) {

@@ -445,7 +445,7 @@ mod tests {
     #[test]
     fn points_that_count_less_cast_fewer_rays() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.obj");
-        let mesh = Mesh::new(crate::load_obj(path).unwrap(), 150.0).unwrap();
+        let mesh = Mesh::new(crate::load_scene(path).unwrap(), 150.0).unwrap();
         let adaptive = RayGather::new(&mesh, 100).unwrap().with_noise(0.1, 0.0);
         // 128, a power of two; 0.1^0.4 is 0.40, and 3^0.4 1.55.
         let rays = [1.0, 0.1, 3.0, 1e-9, 0.0, 1e9].map(|weight| adaptive.rays_of_weight(weight));

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use glam::{DVec2, DVec3};
+use glam::{DAffine2, DVec2, DVec3};
 
 use super::device::Gpu;
 use crate::gather::GatherPoint;
 use crate::mesh::Mesh;
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
-use crate::scene::{Material, Rgb, Scene, Sky, SkyDistribution, Specular, Sun, Triangle};
+use crate::scene::{
+    Material, Rgb, Scene, SceneTextures, Sky, SkyDistribution, Specular, Sun, Triangle,
+};
 
 /// Shifts of pixel centres, pixels: none, then the other points of a grid of ±1/128 in steps of
 /// 1/256. Devices round corners of triangles to a grid of 1/256 pixel, and edge functions in 32
@@ -33,15 +35,7 @@ pub fn textured_scene() -> Mesh {
     let plain = mesh.scene();
     let texel = |k: u8| [k.wrapping_mul(67), k.wrapping_mul(151), k.wrapping_mul(29)];
     let texture = Arc::new(Texture::new(5, 7, (0..35).map(texel).collect()).unwrap());
-    let map = |factor: Rgb| TextureMap {
-        texture: texture.clone(),
-        factor,
-        ceiling: f64::MAX,
-        mean: Rgb::ONE,
-        scale: DVec2::ONE,
-        offset: DVec2::ZERO,
-        clamped: false,
-    };
+    let map = |factor: Rgb| TextureMap { factor, ..TextureMap::new(texture.clone()) };
     let textures = |(m, material): (u32, &Material)| {
         let exitance = Some(map(material.exitance)).filter(|_| material.exitance != Rgb::ZERO);
         (m, MaterialTextures { reflectance: Some(map(Rgb::splat(0.9))), exitance, mask: None })
@@ -55,8 +49,11 @@ pub fn textured_scene() -> Mesh {
         plain.triangles().to_vec(),
         plain.groups().to_vec(),
         plain.materials().to_vec(),
-        (0..plain.triangles().len()).map(coordinates).collect(),
-        (0..).zip(plain.materials()).map(textures).collect(),
+        SceneTextures {
+            coordinates: (0..plain.triangles().len()).map(coordinates).collect(),
+            of_materials: (0..).zip(plain.materials()).map(textures).collect(),
+            ..SceneTextures::default()
+        },
     );
     mesh.with_scene(scene.unwrap()).unwrap()
 }
@@ -218,10 +215,9 @@ fn sheets_with_holes() -> Mesh {
     let solid = |k: usize| [if k * k % 7 % 3 == 1 { 0 } else { 255 }; 3];
     let texture = Arc::new(Texture::new(5, 7, (0..35).map(solid).collect()).unwrap());
     let mask = |clamped: bool, scale: DVec2| {
-        let (factor, ceiling, mean) = (Rgb::ONE, f64::MAX, Rgb::ONE);
         let offset = DVec2::new(0.31, -1.7) * f64::from(!clamped);
-        let texture = texture.clone();
-        let mask = TextureMap { texture, factor, ceiling, mean, scale, offset, clamped };
+        let placement = DAffine2::from_scale_angle_translation(scale, 0.0, offset);
+        let mask = TextureMap { placement, clamped, ..TextureMap::new(texture.clone()) };
         MaterialTextures { mask: Some(mask), ..Default::default() }
     };
     let of_materials = [(1, mask(false, DVec2::new(2.3, 1.4))), (2, mask(true, DVec2::splat(1.2)))];
@@ -230,10 +226,9 @@ fn sheets_with_holes() -> Mesh {
         (0..parts.triangles.len()).map(|t| if t % 2 == 0 { low } else { high }).collect();
     let Parts { positions, triangles, materials } = parts;
     let groups = vec!["all".into()];
-    let textures = of_materials.into_iter().collect();
-    let scene =
-        Scene::with_textures(positions, triangles, groups, materials, coordinates, textures)
-            .unwrap();
+    let of_materials = of_materials.into_iter().collect();
+    let textures = SceneTextures { coordinates, of_materials, ..SceneTextures::default() };
+    let scene = Scene::with_textures(positions, triangles, groups, materials, textures).unwrap();
     Mesh::new(scene.with_sky(Sky::uniform(Rgb::new(0.2, 0.1, 0.3))).unwrap(), 0.7).unwrap()
 }
 

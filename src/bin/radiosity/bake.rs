@@ -143,7 +143,7 @@ impl Bake {
     /// From the scene file to all files that are asked for.
     fn bake_file(mut self, path: &Path) -> Result<Report, Error> {
         let start = Instant::now();
-        self.files.name_after(path, self.reading.unit)?;
+        self.files.name_after(path, &self.reading)?;
         let Input { scene, luminaires, mut warnings, .. } = self.reading.read(path)?;
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;

@@ -12,14 +12,13 @@ use radiosity::io::{
 };
 use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
 use radiosity::verify::Estimate;
-use radiosity::{
-    Backend, BakeResult, BakeSettings, BakeTarget, Camera, Error, ErrorKind, Scene, Sky,
-};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene, Sky};
 
 use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
 };
-use crate::bake::files::{self, SAMPLES, camera};
+use crate::bake::files::{self, SAMPLES};
+use crate::camera_option::CameraOption;
 use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
 use crate::viewer_options::{ViewerOptions, glb_settings};
@@ -91,10 +90,8 @@ pub struct Options {
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "exr,glb")]
     formats: List<Format>,
-    /// Camera of the picture: eye, target, vertical field of view in degrees; and the direction up
-    /// [0,1,0]
-    #[arg(long, value_name = "NUMBERS", value_parser = camera)]
-    camera: Option<Camera>,
+    #[command(flatten)]
+    camera: CameraOption,
     #[command(flatten)]
     viewer: ViewerOptions,
     #[command(flatten)]
@@ -153,9 +150,7 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        if let Some(camera) = &self.camera {
-            camera.check(PICTURE[0], PICTURE[1], SAMPLES)?;
-        }
+        self.camera.find(&self.scene, PICTURE, SAMPLES)?;
         self.viewer.check()?;
         let endings = args::names(FORMATS);
         self.output.name(self.scene.with_extension("light-map"), &endings)?;
@@ -364,17 +359,12 @@ impl Options {
         }
         if writes(Format::Png) {
             let [width, height] = PICTURE;
-            let image = self.camera(baked, PICTURE).image(&surface, width, height, SAMPLES)?;
+            let image =
+                self.camera.of(&baked.light, PICTURE).image(&surface, width, height, SAMPLES)?;
             let tone = self.viewer.of_picture(&image);
             progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
         }
         Ok(())
-    }
-
-    /// The camera of a picture of so many pixels.
-    fn camera(&self, baked: &BakeResult, [width, height]: [u32; 2]) -> Camera {
-        let aspect = f64::from(width) / f64::from(height);
-        self.camera.unwrap_or_else(|| Camera::framing(&baked.light, aspect))
     }
 
     /// The curve of radiosity that the files of a bake are shown with.
@@ -383,7 +373,7 @@ impl Options {
             return Ok(given.of_radiosity());
         }
         let [width, height] = files::IMAGE;
-        let camera = self.camera(baked, files::IMAGE);
+        let camera = self.camera.of(&baked.light, files::IMAGE);
         let image = progress::of_count("pixels of the picture", |report| {
             camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
         })?;

@@ -76,12 +76,13 @@ impl Luminaires {
         self.placed.is_empty()
     }
 
-    /// `scene` with these luminaires. Without an aim they look down.
+    /// `scene` with these luminaires beside its own, whose intensities are per metre. Without an aim
+    /// they look down.
     ///
     /// # Errors
     /// Those of [`Scene::with_luminaires`].
     pub fn over(&self, scene: Scene) -> Result<Scene, Error> {
-        if self.is_empty() {
+        if self.is_empty() && scene.luminaires().is_empty() {
             return Ok(scene);
         }
         let down = -scene.up();
@@ -92,7 +93,10 @@ impl Luminaires {
             let (c0, scale) = (given.c0.unwrap_or(plain.c0), plain.scale * given.scale);
             Luminaire { c0, scale, ..plain }
         };
-        scene.with_luminaires(self.placed.iter().map(luminaire).collect())
+        let of_file = |lamp: &Luminaire| lamp.clone().in_unit_of(metres);
+        let own = scene.luminaires().iter().map(of_file);
+        let all = own.chain(self.placed.iter().map(luminaire)).collect();
+        scene.with_luminaires(all)
     }
 
     /// The positions, and the aims that are given.

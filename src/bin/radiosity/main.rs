@@ -27,6 +27,7 @@ macro_rules! say {
 
 mod args;
 mod bake;
+mod camera_option;
 mod canvas;
 mod grid;
 mod heat;

@@ -10,8 +10,9 @@ use radiosity::solver::Ledger;
 use radiosity::{BakeResult, Rgb};
 use serde_json::{Map, Value, json};
 
-use crate::bake::files::{Picture, camera_value};
+use crate::bake::files::Picture;
 use crate::bake::{Target, bands, settings};
+use crate::camera_option::camera_value;
 use crate::luminaires::Luminaires;
 use crate::progress;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use clap::Args;
-use radiosity::io::SpecularSurfaces;
+use radiosity::io::{LampUnits, SpecularSurfaces};
 use radiosity::scene::{Sides, UpAxis};
-use radiosity::{Error, ObjSettings, Rgb, Scene};
+use radiosity::{Error, Rgb, Scene, SceneSettings};
 
 use crate::args::{Names, Parsed, give, one_of, rgb, value};
 use crate::luminaires::{LuminaireOptions, Luminaires};
@@ -24,6 +24,9 @@ const SPECULAR: Names<SpecularSurfaces> = &[
     ("black", SpecularSurfaces::Black),
     ("ignore", SpecularSurfaces::Ignore),
 ];
+
+const LAMP_UNITS: Names<LampUnits> =
+    &[("auto", LampUnits::Auto), ("candela", LampUnits::Candela), ("watts", LampUnits::Watts)];
 
 /// Units of length, in metres.
 pub const UNITS: Names<f64> =
@@ -71,11 +74,20 @@ pub struct SceneOptions {
     specular: SpecularSurfaces,
     /// Reflectance that replaces one of 1 or more, below 1
     #[arg(long, value_name = "X", hide = true, value_parser = value::<f64>("a number below 1"))]
-    #[arg(default_value_t = ObjSettings::MAX_REFLECTANCE)]
+    #[arg(default_value_t = SceneSettings::MAX_REFLECTANCE)]
     max_reflectance: f64,
     /// Refuse a file that would have to be repaired
     #[arg(long)]
     strict: bool,
+    /// Scene of a glTF file, by its name or number [its own]
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub scene: Option<String>,
+    /// What intensities of lamps in a glTF file are, beside what surfaces emit in W/(m² sr).
+    /// candela: as they are; watts: lumens, at 683 lm/W; auto: watts in files by Blender whose lamps
+    /// have round numbers of them
+    #[arg(long, value_name = "UNITS", hide = true, default_value = "auto")]
+    #[arg(value_parser = one_of(LAMP_UNITS))]
+    lamp_units: LampUnits,
     /// Whether texture coordinates are kept where there is no texture.
     #[arg(skip)]
     pub texture_coordinates: bool,
@@ -94,29 +106,31 @@ pub struct Input {
 }
 
 impl SceneOptions {
-    /// The scene of an OBJ file, under the sky and with the luminaires that the options name.
-    /// Prints warnings.
+    /// The scene of a file, under the sky and with the luminaires that the options name. Prints
+    /// warnings.
     ///
     /// # Errors
-    /// Those of [`ObjSettings::load`], [`SkyOptions::over`], [`Luminaires::read`] and
+    /// Those of [`SceneSettings::load`], [`SkyOptions::over`], [`Luminaires::read`] and
     /// [`Luminaires::over`].
     pub fn read(&self, path: &Path) -> Result<Input, Error> {
         let (scene, up, luminaires) = progress::of_reading(path, || {
             let luminaires = self.luminaires.read(self.unit)?;
-            let mut obj = ObjSettings::default();
-            obj.strict = self.strict;
-            obj.max_reflectance = self.max_reflectance;
-            obj.emit.clone_from(&self.emit);
-            obj.emit_both_sides = self.emit_sides == Sides::Both;
-            obj.transmit.clone_from(&self.transmit);
-            obj.sides = self.sides;
-            obj.specular = self.specular;
-            obj.texture_coordinates = self.texture_coordinates;
-            obj.sky = self.sky.while_reading();
+            let mut settings = SceneSettings::default();
+            settings.strict = self.strict;
+            settings.max_reflectance = self.max_reflectance;
+            settings.emit.clone_from(&self.emit);
+            settings.emit_both_sides = self.emit_sides == Sides::Both;
+            settings.transmit.clone_from(&self.transmit);
+            settings.sides = self.sides;
+            settings.specular = self.specular;
+            settings.texture_coordinates = self.texture_coordinates;
+            settings.scene.clone_from(&self.scene);
+            settings.lamp_units = self.lamp_units;
+            settings.sky = self.sky.while_reading();
             if !luminaires.is_empty() {
-                obj.sky.get_or_insert_default();
+                settings.sky.get_or_insert_default();
             }
-            let scene = obj.load(path)?;
+            let scene = settings.load(path)?;
             let up = match self.sky.up() {
                 Some(axis) => UpAxis::given(axis),
                 None => UpAxis::of(&scene, &luminaires.aims()),

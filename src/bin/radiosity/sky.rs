@@ -163,6 +163,8 @@ impl SkyOptions {
             }
             Some(Kind::Irradiance(_)) => Sky::default(),
         };
+        // A directional lamp of the file shines on under another sky.
+        let sun = sun.or(scene.sky().sun().copied());
         scene.with_sky(match sun {
             Some(sun) => sky.with_sun(sun)?,
             None => sky,

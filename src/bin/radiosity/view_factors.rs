@@ -15,7 +15,7 @@ use files::MatrixOptions;
 use radiosity::io::SpecularSurfaces;
 use radiosity::scene::{Warning, WarningKind};
 use radiosity::view_factor::{MatrixRows, backs_met};
-use radiosity::{Error, ErrorKind, ObjSettings, Scene, ViewFactors};
+use radiosity::{Error, ErrorKind, Scene, SceneSettings, ViewFactors};
 pub use report::print_checks;
 
 use crate::args::{self, Stop, value};
@@ -85,7 +85,7 @@ impl ToError {
     /// The scene of a file, in which mirrors and glass are surfaces as all others are. Prints what
     /// was odd about it.
     pub fn scene(&self, path: &Path) -> Result<Scene, Error> {
-        let mut obj = ObjSettings::default();
+        let mut obj = SceneSettings::default();
         obj.specular = SpecularSurfaces::Ignore;
         obj.facets = self.facets;
         obj.strict = self.strict;

@@ -129,12 +129,13 @@ impl Texels<'_> {
 
     /// Centres of all texels, in texture coordinates as in the file, rows from the top.
     fn all(&self) -> impl IndexedParallelIterator<Item = DVec2> {
-        let ([width, height], frame) = (self.size, self.shown.frame());
+        let [width, height] = self.size;
+        let frame = self.shown.frame().map(|map| map.placement.inverse());
         let count = width as usize * height as usize;
         (0..count).into_par_iter().map(move |k| {
             let [x, y] = [k % width as usize, k / width as usize].map(|k| k as f64 + 0.5);
             let place = DVec2::new(x / f64::from(width), 1.0 - y / f64::from(height));
-            frame.map_or(place, |map| (place - map.offset) / map.scale)
+            frame.map_or(place, |to_file| to_file.transform_point2(place))
         })
     }
 

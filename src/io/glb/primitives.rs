@@ -41,7 +41,10 @@ impl<'a> Shown<'a> {
     /// The texture of the exitance, else of the reflectance, and the mask.
     pub fn of(textures: &'a MaterialTextures) -> Option<Shown<'a>> {
         let MaterialTextures { reflectance, exitance, mask } = textures;
-        let (colours, emits) = (exitance.as_ref().or(reflectance.as_ref()), exitance.is_some());
+        // One texel has no picture; colours of vertices are multiplied with it.
+        let picture = |map: &&'a TextureMap| map.texture.size() != [1, 1];
+        let (colours, emits) =
+            (exitance.as_ref().or(reflectance.as_ref()).filter(picture), exitance.is_some());
         let shown = Shown { colours, emits, mask: mask.as_ref() };
         shown.frame().is_some().then_some(shown)
     }
@@ -127,7 +130,7 @@ fn textured<'a>(
         let barycentric = scene.barycentric(t, surface.positions[v as usize]);
         let place = scene.texture_point(t, barycentric);
         let frame = shown.and_then(|shown| shown.frame());
-        let place = frame.map_or(place, |map| place * map.scale + map.offset);
+        let place = frame.map_or(place, |map| map.placed(place));
         let place = DVec2::new(place.x, 1.0 - place.y);
         // Nearer coordinates are one vertex: a hundredth of a texel of a large image, far more than
         // the rounding difference of two triangles along their common side.

@@ -1,17 +1,21 @@
 //! The materials of a scene from those of its libraries: repaired, with textures, and with the
 //! light given by the caller.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use glam::DAffine2;
+
+use super::super::SceneSettings;
+use super::super::given::{beside_transmittance, check_names, give_light};
 use super::super::mtl::MtlMaterial;
 use super::super::specular::SpecularSurfaces;
 use super::super::textures::{TextureStatement, Textures, Unread};
+use super::ObjFile;
 use super::repairs::Repairs;
 use super::statements::UNKNOWN_MATERIAL;
-use super::{ObjFile, ObjSettings};
-use crate::error::{Error, ErrorKind, nearest, quoted};
+use crate::error::Error;
 use crate::scene::texture::{MaterialTextures, Texture, TextureMap};
 use crate::scene::{Material, Rgb, Specular, Triangle, WarningKind};
 
@@ -22,7 +26,7 @@ impl ObjFile<'_> {
         &mut self,
         used: &HashSet<u32>,
         materials: &mut [Material],
-        settings: &ObjSettings,
+        settings: &SceneSettings,
     ) -> Result<BTreeMap<u32, MaterialTextures>, Error> {
         let mut images = Textures::new(self.files);
         let mut all: BTreeMap<u32, MaterialTextures> = BTreeMap::new();
@@ -69,7 +73,7 @@ impl ObjFile<'_> {
         &mut self,
         used: &HashSet<u32>,
         triangles: &[Triangle],
-        settings: &ObjSettings,
+        settings: &SceneSettings,
     ) -> Result<Vec<Material>, Error> {
         let library = &mut self.library;
         let mut materials = Vec::with_capacity(library.materials.len());
@@ -95,82 +99,13 @@ impl ObjFile<'_> {
         if used.contains(&(materials.len() as u32)) {
             materials.push(grey("(default)"));
         }
-        materials.iter_mut().for_each(|material| material.sides = settings.sides);
-        for (name, radiance) in &settings.emit {
-            self.named(&mut materials, triangles, name, "that could emit", |material| {
-                material.exitance = PI * *radiance;
-            })?;
+        for material in &mut materials {
+            material.sides = settings.sides;
+            give_light(material, settings);
         }
-        for (name, transmittance) in &settings.transmit {
-            let what = "that could let light through";
-            self.named(&mut materials, triangles, name, what, |material| {
-                let all = material.albedo();
-                material.transmittance = transmittance.min(Rgb::splat(settings.max_reflectance));
-                material.reflectance = (all - material.transmittance).max(Rgb::ZERO);
-            })?;
-        }
+        let groups = &self.statements.groups.list;
+        check_names(&materials, triangles, groups, self.path, settings)?;
         Ok(materials)
-    }
-
-    /// Calls a function with the material of this `name`.
-    fn named(
-        &self,
-        materials: &mut [Material],
-        triangles: &[Triangle],
-        name: &str,
-        what: &str,
-        change: impl Fn(&mut Material),
-    ) -> Result<(), Error> {
-        let mut found = false;
-        for material in materials.iter_mut().filter(|m| m.name == *name) {
-            change(material);
-            found = true;
-        }
-        if found {
-            return Ok(());
-        }
-        let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-        let place = self.path.display().to_string();
-        if let Some((found, remedy)) = self.group_named(name, &names, triangles) {
-            return Err(Error::new(ErrorKind::Scene, place, found, remedy));
-        }
-        let found = format!("no material {} {what}", quoted(&[name]));
-        let meant = nearest(name, names.iter().copied());
-        let meant =
-            meant.map_or(String::new(), |near| format!("did you mean {}? ", quoted(&[near])));
-        let remedy = format!("{meant}its materials are {}", quoted(&names));
-        Err(Error::new(ErrorKind::Scene, place, found, remedy))
-    }
-
-    /// If `name` is a group and not a material: the finding, and the correction.
-    fn group_named(
-        &self,
-        name: &str,
-        materials: &[&str],
-        triangles: &[Triangle],
-    ) -> Option<(String, String)> {
-        let group = self.statements.groups.list.iter().position(|group| group == name)? as u32;
-        let in_group = triangles.iter().filter(|t| t.group == group);
-        let own: BTreeSet<u32> = in_group.map(|t| t.material).collect();
-        let own_names: Vec<&str> =
-            own.iter().filter_map(|&k| materials.get(k as usize).copied()).collect();
-        let sharing = triangles.iter().filter(|t| own.contains(&t.material));
-        let sharing = sharing.map(|t| t.group).collect::<BTreeSet<u32>>().len();
-        let (group, list) = (quoted(&[name]), quoted(&own_names));
-        let found = match (own_names.len(), sharing) {
-            (0, _) => return None,
-            (1, 1) => {
-                return Some((
-                    format!("{group} is a group, of material {list}"),
-                    "name the material".into(),
-                ));
-            }
-            (1, _) => {
-                format!("{group} is a group, of material {list}, which {sharing} groups share")
-            }
-            _ => format!("{group} is a group, of materials {list}"),
-        };
-        Some((found, "give it its own usemtl".into()))
     }
 }
 
@@ -197,15 +132,8 @@ fn texture_map(
             None
         }
     };
-    Ok(texture.map(|texture| TextureMap {
-        texture,
-        factor: Rgb::ONE,
-        ceiling: f64::MAX,
-        mean: Rgb::ONE,
-        scale,
-        offset,
-        clamped,
-    }))
+    let placement = DAffine2::from_scale_angle_translation(scale, 0.0, offset);
+    Ok(texture.map(|texture| TextureMap { placement, clamped, ..TextureMap::new(texture) }))
 }
 
 fn is_not_black(colour: &Rgb) -> bool {
@@ -219,33 +147,23 @@ impl MtlMaterial {
         &self,
         map: TextureMap,
         material: &mut Material,
-        settings: &ObjSettings,
+        settings: &SceneSettings,
     ) -> TextureMap {
         let ceiling = settings.max_reflectance.min(self.diffuse_room(settings));
-        let mut factor = match self.reflectance.filter(is_not_black) {
+        let factor = match self.reflectance.filter(is_not_black) {
             Some(_) => material.albedo(),
             None => Rgb::splat(ceiling),
         };
-        if material.is_translucent() {
-            // The transmittance is a fraction of the texture's total; the remaining reflectance
-            // gives the distribution over the texture.
-            let all = factor * map.texture.whole_mean();
-            let share = material.transmittance / all.max(Rgb::splat(f64::MIN_POSITIVE));
-            let share = share.min(Rgb::splat(0.99));
-            material.transmittance = share * all;
-            factor *= Rgb::ONE - share;
-        }
-        let mean = factor * map.texture.whole_mean();
-        TextureMap { factor, ceiling, mean, ..map }
+        beside_transmittance(TextureMap { factor, ceiling, ..map }, material)
     }
 
     /// The mirror or glass of this material, if the settings use it.
-    fn specular(&self, settings: &ObjSettings) -> Option<Specular> {
+    fn specular(&self, settings: &SceneSettings) -> Option<Specular> {
         self.specular.filter(|_| settings.specular != SpecularSurfaces::Ignore)
     }
 
     /// Whether it reflects nothing in the light solution: it is black, or clear.
-    fn is_black(&self, settings: &ObjSettings) -> bool {
+    fn is_black(&self, settings: &SceneSettings) -> bool {
         match settings.specular {
             SpecularSurfaces::Black => self.specular.is_some(),
             SpecularSurfaces::Clear => self.specular.is_some_and(|specular| specular.is_glass()),
@@ -254,7 +172,7 @@ impl MtlMaterial {
     }
 
     /// Maximum diffuse reflectance beside a mirror or glass, equal in all channels.
-    fn diffuse_room(&self, settings: &ObjSettings) -> f64 {
+    fn diffuse_room(&self, settings: &SceneSettings) -> f64 {
         self.specular(settings).map_or(1.0, |specular| 1.0 - specular.share().max_element())
     }
 
@@ -278,7 +196,7 @@ impl MtlMaterial {
     /// As a material of a scene, without its name; `note` is called with every repair.
     fn complete(
         &self,
-        settings: &ObjSettings,
+        settings: &SceneSettings,
         ambient_counts: bool,
         note: &mut impl FnMut(WarningKind, String) -> Result<(), Error>,
     ) -> Result<Material, Error> {

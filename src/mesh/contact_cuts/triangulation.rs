@@ -8,13 +8,14 @@ use spade::{
     AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation,
 };
 
+use super::crossings::{FINE_STEPS, FinePoint, split_at_crossings};
 use super::snapping::{Cuts, LatticePoint, STEPS};
 use crate::mesh::Side;
 use crate::scene::Piece;
 
-/// Weights are rounded to multiples of one over this: finer than the lattice, so that its points
-/// are unchanged, and near-equal intersections of segments merge.
-const ROUNDING: f64 = 4.0 * STEPS as f64;
+/// Weights are rounded to multiples of one over this, the lattice of crossings: points of that and
+/// of the coarser one are unchanged.
+const ROUNDING: f64 = FINE_STEPS as f64;
 
 type Delaunay = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
@@ -61,10 +62,21 @@ impl CutTriangle {
                 triangulation.add_constraint(from, to);
             }
         }
-        for &[from, to] in &cuts.segments {
-            let from = triangulation.insert(position(from)).ok()?;
-            let to = triangulation.insert(position(to)).ok()?;
-            triangulation.add_constraint_and_split(from, to, |point| point);
+        let fine = |[u, v]: FinePoint| {
+            let [u, v] = [u, v].map(|k| k as f64 / FINE_STEPS as f64);
+            Point2::new(u * stretch, v)
+        };
+        let mut constraints = vec![];
+        for [from, to] in split_at_crossings(&cuts.segments) {
+            let ends =
+                [triangulation.insert(fine(from)).ok()?, triangulation.insert(fine(to)).ok()?];
+            constraints.push(ends);
+        }
+        // All ends are known, so that a constraint ends at those on its way.
+        for [from, to] in constraints {
+            if triangulation.can_add_constraint(from, to) {
+                triangulation.add_constraint(from, to);
+            }
         }
         Some(triangulation)
     }

@@ -1,20 +1,24 @@
 //! The files that a bake writes: STEM with the ending of each.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use radiosity::bake::ErrorEstimate;
 use radiosity::bands::BandLight;
 use radiosity::camera::RadianceImage;
-use radiosity::glam::DVec3;
-use radiosity::io::{ToneCurve, write_ply_bands, write_ply_with_tone, write_png_with_tone};
+use radiosity::io::{
+    GlbSettings, LitVertices, ToneCurve, gltf_ending, write_lit_gltf, write_ply_bands,
+    write_ply_with_tone, write_png_with_tone,
+};
 use radiosity::{
-    Backend, BakeResult, Camera, Error, GatheredMesh, VertexMesh, write_exr, write_glb,
+    Backend, BakeResult, Camera, Error, ErrorKind, GatheredMesh, VertexMesh, write_exr, write_glb,
 };
 
-use crate::args::{self, List, Names, Output, Parsed, give, numbers, some_of};
+use crate::args::{self, List, Names, Output, numbers, some_of};
 use crate::bake::bands;
+use crate::camera_option::CameraOption;
 use crate::progress;
+use crate::scene_options::SceneOptions;
 use crate::viewer_options::{ViewerOptions, glb_settings, is_lit};
 
 /// Rays along a pixel's side.
@@ -55,15 +59,18 @@ pub struct Files {
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "ply,glb,json,exr,png")]
     formats: List<Format>,
-    /// Camera of the picture: eye, target, vertical field of view in degrees; and the direction up
-    /// [0,1,0] [default: chosen, and in the report]
-    #[arg(long, value_name = "NUMBERS", value_parser = camera)]
-    camera: Option<Camera>,
+    #[command(flatten)]
+    camera: CameraOption,
     #[command(flatten)]
     viewer: ViewerOptions,
+    /// For a glTF file: write the mesh that was refined, not the file with light at its vertices
+    #[arg(long, hide = true)]
+    refine: bool,
     /// Metres in the scene's unit.
     #[arg(skip = 1.0)]
     metres: f64,
+    #[arg(skip)]
+    source: Option<Source>,
     /// Pixels of the picture
     #[arg(long, value_name = "W,H", default_value = "512,512")]
     #[arg(value_parser = numbers::<u32, 2>("2 whole numbers with a comma between them"))]
@@ -76,6 +83,14 @@ pub struct Files {
     elements: bool,
 }
 
+/// The glTF file that a scene is from.
+struct Source {
+    path: PathBuf,
+    ending: &'static str,
+    /// Name of its scene, if one was given.
+    scene: Option<String>,
+}
+
 /// How a picture was taken.
 #[derive(Clone, Copy)]
 pub struct Picture {
@@ -86,16 +101,26 @@ pub struct Picture {
 
 impl Files {
     /// Names the files after the scene, where they are given no name, and checks whether all of it
-    /// can be written, before any work is done for it. `metres` are those of the scene's unit.
-    pub fn name_after(&mut self, scene: &Path, metres: f64) -> Result<(), Error> {
-        self.metres = metres;
-        self.output.name(scene.with_extension(""), &args::names(FORMATS))?;
+    /// can be written, before any work is done for it.
+    pub fn name_after(&mut self, scene: &Path, reading: &SceneOptions) -> Result<(), Error> {
+        self.metres = reading.unit;
+        let of_scene = |ending| Source { path: scene.into(), ending, scene: reading.scene.clone() };
+        self.source = gltf_ending(scene)?.map(of_scene);
+        // Not over the scene itself.
+        let ending = if self.source.is_some() { "baked" } else { "" };
+        self.output.name(scene.with_extension(ending), &args::names(FORMATS))?;
+        if ["glb", "gltf"].iter().any(|ending| self.output.path(ending) == scene) {
+            let place = scene.display().to_string();
+            let remedy = "give the results another name with --out";
+            return Err(Error::new(
+                ErrorKind::Setting,
+                place,
+                "its results would replace it",
+                remedy,
+            ));
+        }
         self.viewer.check()?;
-        let [width, height] = self.image;
-        // The one that will be chosen is good; sizes are checked with any.
-        let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
-        let any = Camera { eye, target, up, vertical_fov: 90.0 };
-        self.camera.unwrap_or(any).check(width, height, SAMPLES)
+        self.camera.find(scene, self.image, SAMPLES)
     }
 
     fn writes(&self, format: Format) -> bool {
@@ -107,7 +132,7 @@ impl Files {
         let mut picture = None;
         let mut image = None;
         if self.writes(Format::Exr) || self.writes(Format::Png) {
-            let camera = self.camera.unwrap_or_else(|| self.framing(baked));
+            let camera = self.camera.of(&baked.light, self.image);
             let seen = self.picture(&camera, baked, device)?;
             let any_lit = || baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0);
             if !is_lit(&seen) && any_lit() {
@@ -122,14 +147,6 @@ impl Files {
         let tone = self.viewer.of_meshes(image.as_ref(), baked);
         self.write_meshes(baked, &tone)?;
         Ok(picture)
-    }
-
-    /// The camera where none is given.
-    fn framing(&self, baked: &BakeResult) -> Camera {
-        let [width, height] = self.image;
-        progress::of_stage("choosing a view", || {
-            Camera::framing(&baked.light, f64::from(width) / f64::from(height))
-        })
     }
 
     /// Writes a picture to files whose endings begin with `of`.
@@ -159,15 +176,36 @@ impl Files {
             })?;
         }
         if self.writes(Format::Glb) {
-            let settings = glb_settings(tone, self.metres, baked);
-            let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
-            progress::of_writing(&self.output.path("glb"), write)?;
+            self.write_glb(baked, &glb_settings(tone, self.metres, baked))?;
         }
         if self.elements {
             progress::of_writing(&self.output.path("elements.ply"), |path| {
                 let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
                 write_ply_with_tone(path, &flat, tone)
             })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the glTF file of the scene with its light, or the mesh of the light.
+    fn write_glb(&self, baked: &BakeResult, settings: &GlbSettings) -> Result<(), Error> {
+        let Some(source) = self.source.as_ref().filter(|_| !self.refine) else {
+            let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
+            return progress::of_writing(&self.output.path("glb"), write);
+        };
+        let Source { path, ending, scene } = source;
+        let write =
+            |to: &Path| write_lit_gltf(to, path, &baked.light, scene.as_deref(), settings.clone());
+        let counts = progress::of_writing(&self.output.path(ending), write)?;
+        let LitVertices { without, instances, .. } = counts;
+        if without > 0 {
+            eprintln!("warning: {without} vertices are of no lit triangle: black in the glTF file");
+        }
+        if instances > 0 {
+            eprintln!(
+                "warning: {instances} instances share their vertices, and have no light in the glTF \
+                 file: --refine writes a mesh for each"
+            );
         }
         Ok(())
     }
@@ -239,32 +277,6 @@ impl Files {
         })?;
         Ok(image.expect("its progress never stops it"))
     }
-}
-
-/// Eye, target, degrees and, if there are three more numbers, the direction up.
-pub fn camera(text: &str) -> Parsed<Camera> {
-    let expected = "7 numbers with commas between them, eye, target and degrees, or 10: \
-                            the direction up behind them";
-    let mut numbers = args::list(expected)(text)?;
-    if numbers.len() == 7 {
-        numbers.extend([0.0, 1.0, 0.0]);
-    }
-    if numbers.len() != 10 {
-        return Err(give(expected));
-    }
-    let point = |k: usize| DVec3::from_slice(&numbers[k..k + 3]);
-    Ok(Camera { eye: point(0), target: point(3), up: point(7), vertical_fov: numbers[6] })
-}
-
-/// `camera` as the value of `--camera`.
-pub fn camera_value(camera: &Camera) -> String {
-    let Camera { eye, target, up, vertical_fov } = camera;
-    let mut numbers = [eye.to_array(), target.to_array()].concat();
-    numbers.push(*vertical_fov);
-    if up.to_array() != [0.0, 1.0, 0.0] {
-        numbers.extend(up.to_array());
-    }
-    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
 /// How a PLY file begins to tell its error, in per cent.

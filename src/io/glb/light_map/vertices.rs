@@ -130,7 +130,7 @@ fn given_places(map: &LightMap, t: usize) -> [DVec2; 3] {
     let scene = map.atlas.scene();
     let frame = scene.textures(t).and_then(Shown::of).and_then(|shown| shown.frame());
     scene.texture_coordinates(t).unwrap_or([DVec2::NAN; 3]).map(|place| {
-        let place = frame.map_or(place, |map| place * map.scale + map.offset);
+        let place = frame.map_or(place, |map| map.placed(place));
         DVec2::new(place.x, 1.0 - place.y)
     })
 }

@@ -1,0 +1,337 @@
+//! The same glTF file with light at its vertices.
+//!
+//! ```text
+//!   document ── as it is, but for meshes of lit nodes ── attributes COLOR_0, _IRRADIANCE
+//!   buffers  ── as they are                           ── and their numbers behind them
+//! ```
+//!
+//! A mesh of several nodes has one copy for each whose light differs.
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use rustc_hash::FxHashMap;
+use serde_json::{Value, json};
+
+use super::accessors::Values;
+use super::container::{Buffers, Container};
+use super::document::Document;
+use super::geometry::{Geometry, Group, MeshReader};
+use super::nodes::Nodes;
+use super::{Fault, materials};
+use crate::error::Error;
+use crate::gather::GatheredMesh;
+use crate::io::files::{FileSource, MAX_BYTES, read_bytes};
+use crate::io::glb::GlbSettings;
+use crate::io::{cannot_read, cannot_write, write_file};
+use crate::scene::Rgb;
+
+/// Cosine below which two normals at one point are of different surfaces: 20°, half of
+/// [`Mesh::CREASE_DEGREES`](crate::Mesh::CREASE_DEGREES).
+const SAME_SURFACE: f64 = 0.94;
+
+/// Writes the glTF file `source` again to `path`, binary or JSON as it is, with the `light` of a
+/// bake of it: a primitive gets `_IRRADIANCE` (W/m² per channel, linear, 32-bit floats) and, where
+/// it has no colours, `COLOR_0`: irradiance times reflectance 1 through the tone curve, within
+/// [0, 1], linear. Vertices keep their number and order, and all else in the document and its
+/// buffers stays as it is. The new numbers are behind those of the binary file, or in a data URI.
+///
+/// A vertex has the light of the baked vertices at its point in its node's group, of those whose
+/// normals are within 20° of its own; without normals, of all. Both sides of a surface that are lit
+/// share a vertex: it has their mean. Instances (`EXT_mesh_gpu_instancing`) are left out, since they
+/// share vertices.
+///
+/// # Errors
+/// [`crate::ErrorKind::File`] when a file cannot be read or written, [`crate::ErrorKind::Scene`]
+/// for a source that is no glTF file.
+pub fn write_lit_gltf(
+    path: impl AsRef<Path>,
+    source: impl AsRef<Path>,
+    light: &GatheredMesh,
+    scene: Option<&str>,
+    settings: impl Into<GlbSettings>,
+) -> Result<LitVertices, Error> {
+    let (path, source) = (path.as_ref(), source.as_ref());
+    let at_source = |fault: Fault| fault.at(source.display().to_string());
+    let bytes = read_bytes(source, MAX_BYTES);
+    let bytes = bytes.map_err(|e| cannot_read(source, e, "give the glTF file of the scene"))?;
+    let files = FileSource::in_folder(source.parent().unwrap_or(Path::new("")));
+    let container = Container::new(&bytes).map_err(at_source)?;
+    let document = container.document().map_err(at_source)?;
+    let buffers = Buffers::new(&container, &document, &files);
+    let nodes = Nodes::new(&document, scene).map_err(at_source)?;
+    let set_of = |material: Option<usize>| materials::coordinate_set(&document, material);
+    let geometry = Geometry::new(&document, &buffers, &nodes, &set_of);
+    let geometry = geometry.map_err(|(node, fault)| fault.at(node).inside(source))?;
+    let mut writer = Writer {
+        document: &document,
+        reader: MeshReader::new(&document, &buffers, &nodes, &set_of),
+        light: LightOfGroups::new(light),
+        settings: settings.into(),
+        buffer: container.buffer_of_new(&document),
+        is_placed: nodes.is_placed(),
+        json: container.json().map_err(at_source)?,
+        binary: vec![],
+        known: FxHashMap::default(),
+        counts: LitVertices::default(),
+    };
+    for (number, group) in (0u32..).zip(&geometry.places) {
+        writer.light_node(number, group).map_err(at_source)?;
+    }
+    let Writer { json, binary, counts, .. } = writer;
+    let file = container.with(json, &binary, &document).map_err(|e| cannot_write(path, e))?;
+    write_file(path, |out| std::io::Write::write_all(out, &file))?;
+    Ok(counts)
+}
+
+/// How many vertices of a file have light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LitVertices {
+    /// Vertices that have the light of the bake.
+    pub lit: usize,
+    /// Those at whose point there is none: of triangles without area, or of no triangle. They are
+    /// black.
+    pub without: usize,
+    /// Instances that are left out.
+    pub instances: usize,
+}
+
+/// Light of the vertices of a bake at one point of a group.
+#[derive(Clone, Copy)]
+struct AtPoint {
+    normal: DVec3,
+    irradiance: Rgb,
+}
+
+/// Light of a bake, by group and point.
+struct LightOfGroups(FxHashMap<(u32, [u64; 3]), Vec<AtPoint>>);
+
+/// The bits of a point; those of 0 for both zeros.
+fn bits(p: DVec3) -> [u64; 3] {
+    (p + 0.0).to_array().map(f64::to_bits)
+}
+
+impl LightOfGroups {
+    fn new(light: &GatheredMesh) -> LightOfGroups {
+        let (surface, mesh) = (&light.surface, &light.mesh);
+        let mut all: FxHashMap<(u32, [u64; 3]), Vec<AtPoint>> = FxHashMap::default();
+        let mut seen: FxHashMap<(u32, u32), ()> = FxHashMap::default();
+        for (face, &element) in surface.faces.iter().zip(&surface.elements) {
+            let t = mesh.triangle(mesh.element(element as usize));
+            let group = mesh.scene().triangles()[t].group;
+            for &v in face {
+                if seen.insert((group, v), ()).is_none() {
+                    let normal = surface.normals[v as usize];
+                    let irradiance = surface.irradiance.get(v as usize).copied();
+                    let at = AtPoint { normal, irradiance: irradiance.unwrap_or(Rgb::ZERO) };
+                    let key = (group, bits(surface.positions[v as usize]));
+                    all.entry(key).or_default().push(at);
+                }
+            }
+        }
+        LightOfGroups(all)
+    }
+
+    /// Irradiance of a vertex of `group`, with its unit normal if it has one.
+    fn at(&self, group: u32, position: DVec3, normal: Option<DVec3>) -> Option<Rgb> {
+        let all = self.0.get(&(group, bits(position)))?;
+        // A surface that was turned to the light has another front than the file's.
+        let cosine = |at: &AtPoint| normal.map_or(1.0, |normal| at.normal.dot(normal).abs());
+        let nearest = all.iter().map(cosine).fold(0.0, f64::max);
+        let is_of_it = |at: &&AtPoint| cosine(at) >= SAME_SURFACE.min(nearest);
+        let (sum, count) = all
+            .iter()
+            .filter(is_of_it)
+            .fold((Rgb::ZERO, 0.0), |(sum, count), at| (sum + at.irradiance, count + 1.0));
+        (count > 0.0).then(|| sum / count)
+    }
+}
+
+/// A mesh of the new file: that of the source, the irradiance of its vertices by primitives, and
+/// its number.
+struct LitMesh {
+    irradiance: Vec<Vec<Rgb>>,
+    number: usize,
+}
+
+struct Writer<'a, 'b> {
+    document: &'a Document,
+    reader: MeshReader<'a, 'b>,
+    light: LightOfGroups,
+    settings: GlbSettings,
+    /// The buffer of new numbers, and how many bytes it has before them.
+    buffer: (usize, usize),
+    /// Whether each node is in the scene.
+    is_placed: Vec<bool>,
+    json: Value,
+    /// New numbers.
+    binary: Vec<u8>,
+    /// Of each mesh of the source.
+    known: FxHashMap<usize, Vec<LitMesh>>,
+    counts: LitVertices,
+}
+
+impl Writer<'_, '_> {
+    /// Gives light to the mesh of a node.
+    fn light_node(&mut self, number: u32, group: &Group) -> Result<(), Fault> {
+        if group.is_instance {
+            self.counts.instances += 1;
+            return Ok(());
+        }
+        let node = &self.document.nodes[group.node];
+        let Some(mesh) = node.mesh else { return Ok(()) };
+        let irradiance = self.irradiance(number, group, mesh)?;
+        let same = self.known.get(&mesh).and_then(|all| {
+            let is_same =
+                |lit: &&LitMesh| are_equal(&lit.irradiance, &irradiance, self.settings.error);
+            all.iter().find(is_same).map(|lit| lit.number)
+        });
+        let number = match same {
+            Some(number) => number,
+            None => self.add_mesh(mesh, irradiance),
+        };
+        self.json["nodes"][group.node]["mesh"] = json!(number);
+        Ok(())
+    }
+
+    /// Irradiance of the vertices of each primitive.
+    fn irradiance(
+        &mut self,
+        number: u32,
+        group: &Group,
+        mesh: usize,
+    ) -> Result<Vec<Vec<Rgb>>, Fault> {
+        let node = &self.document.nodes[group.node];
+        let mut all = vec![];
+        for primitive in &self.document.meshes[mesh].primitives {
+            let mut of_primitive = vec![];
+            if primitive.mode.is_none_or(|mode| (4..=6).contains(&mode))
+                && let Some(positions) = self.reader.posed_vertices(node, mesh, primitive)?
+            {
+                let normals = primitive.attributes.others.get("NORMAL").and_then(Value::as_u64);
+                let normals = normals.map(|k| self.reader.values(k as usize)).transpose()?;
+                let normals = normals.filter(|values| values.has_components(3));
+                let turn = normal_transform(group.world);
+                for (v, p) in positions.into_iter().enumerate() {
+                    let normal = normals.as_ref().map(|normals: &Values<'_>| {
+                        turn.transform_vector3(DVec3::from_array(normals.get(v)))
+                    });
+                    let normal = normal.and_then(DVec3::try_normalize);
+                    let found = self.light.at(number, group.world.transform_point3(p), normal);
+                    match found {
+                        Some(_) => self.counts.lit += 1,
+                        None => self.counts.without += 1,
+                    }
+                    of_primitive.push(found.unwrap_or(Rgb::ZERO));
+                }
+            }
+            all.push(of_primitive);
+        }
+        Ok(all)
+    }
+
+    /// Adds a mesh like `mesh` of the source with this light, or adds it to that mesh, if all nodes
+    /// that have it are lit and it is the first: its number.
+    fn add_mesh(&mut self, mesh: usize, irradiance: Vec<Vec<Rgb>>) -> usize {
+        let users = self.document.nodes.iter().enumerate().filter(|(_, n)| n.mesh == Some(mesh));
+        let is_shared = users
+            .into_iter()
+            .any(|(k, node)| !self.is_placed[k] || node.extensions.instances.is_some());
+        let number = if self.known.contains_key(&mesh) || is_shared {
+            let copy = self.document_mesh(mesh);
+            let meshes = self.json["meshes"].as_array_mut().expect("it has the mesh");
+            meshes.push(copy);
+            meshes.len() - 1
+        } else {
+            mesh
+        };
+        // Primitives that share their vertices share their light.
+        let mut shared: FxHashMap<(usize, bool), [Option<usize>; 2]> = FxHashMap::default();
+        for (k, of_primitive) in irradiance.iter().enumerate().filter(|(_, all)| !all.is_empty()) {
+            let attributes = &self.document.meshes[mesh].primitives[k].attributes;
+            let Some(position) = attributes.position else { continue };
+            let has_colours = attributes.colour.is_some();
+            let accessors = match shared.get(&(position, has_colours)) {
+                Some(known) => *known,
+                None => {
+                    let added = self.add_light(of_primitive, has_colours);
+                    shared.insert((position, has_colours), added);
+                    added
+                }
+            };
+            let to = &mut self.json["meshes"][number]["primitives"][k]["attributes"];
+            for (name, accessor) in ["_IRRADIANCE", "COLOR_0"].into_iter().zip(accessors) {
+                if let Some(accessor) = accessor {
+                    to[name] = json!(accessor);
+                }
+            }
+        }
+        self.known.entry(mesh).or_default().push(LitMesh { irradiance, number });
+        number
+    }
+
+    /// The mesh of the source, without light.
+    fn document_mesh(&self, mesh: usize) -> Value {
+        let mut copy = self.json["meshes"][mesh].clone();
+        let primitives = copy["primitives"].as_array_mut().into_iter().flatten();
+        for (primitive, source) in primitives.zip(&self.document.meshes[mesh].primitives) {
+            if let Some(attributes) = primitive["attributes"].as_object_mut() {
+                attributes.shift_remove("_IRRADIANCE");
+                if source.attributes.colour.is_none() {
+                    attributes.shift_remove("COLOR_0");
+                }
+            }
+        }
+        copy
+    }
+
+    /// Adds irradiance and, unless there are colours, the colours that show it: their accessors.
+    fn add_light(&mut self, irradiance: &[Rgb], has_colours: bool) -> [Option<usize>; 2] {
+        let limit = Rgb::splat(f64::from(f32::MAX));
+        let numbers = irradiance.iter().map(|e| e.min(limit).as_vec3().to_array()).collect();
+        let tone = self.settings.tone;
+        let colours = || irradiance.iter().map(|e| tone.linear(*e).as_vec3().to_array()).collect();
+        let colours = (!has_colours).then(colours);
+        [Some(self.add_accessor(numbers)), colours.map(|colours| self.add_accessor(colours))]
+    }
+
+    fn add_accessor(&mut self, vectors: Vec<[f32; 3]>) -> usize {
+        let (offset, count) = (self.binary.len(), vectors.len());
+        self.binary.extend(vectors.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+        let (buffer, before) = self.buffer;
+        let view = json!({
+            "buffer": buffer, "byteOffset": before + offset, "byteLength": 12 * count,
+            "byteStride": 12, "target": 34962,
+        });
+        let view = push(&mut self.json, "bufferViews", view);
+        let accessor =
+            json!({ "bufferView": view, "componentType": 5126, "count": count, "type": "VEC3" });
+        push(&mut self.json, "accessors", accessor)
+    }
+}
+
+/// Adds an item to a list of a document: its number.
+fn push(json: &mut Value, list: &str, item: Value) -> usize {
+    if !json[list].is_array() {
+        json[list] = json!([]);
+    }
+    let list = json[list].as_array_mut().expect("it was made one");
+    list.push(item);
+    list.len() - 1
+}
+
+/// From normals of a mesh to those of the world, up to their length.
+fn normal_transform(world: DAffine3) -> DAffine3 {
+    let m = world.matrix3;
+    // Cofactors: the inverse transpose times the determinant, which may be 0.
+    let (x, y, z) = (m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    DAffine3::from_cols(x, y, z, DVec3::ZERO)
+}
+
+/// Whether light is the same but for `error`, as a share of its mean.
+fn are_equal(a: &[Vec<Rgb>], b: &[Vec<Rgb>], error: f64) -> bool {
+    let pairs = || a.iter().flatten().zip(b.iter().flatten());
+    let mean = pairs().map(|(a, b)| (*a + *b).element_sum() / 6.0).sum::<f64>()
+        / pairs().count().max(1) as f64;
+    pairs().all(|(a, b)| (*a - *b).abs().max_element() <= error * mean)
+}
