@@ -184,8 +184,8 @@ fn first_gather_mesh(
     if gather.contact_levels == 0 {
         return Ok(mesh);
     }
-    let at_contacts = mesh
-        .split_at_contacts(gather.contact_levels)
-        .split_beside_cuts(gather.contact_levels, gather.refinement.min_edge);
+    let (levels, finest) = (gather.contact_levels, gather.refinement.min_edge);
+    let at_contacts =
+        mesh.split_at_contacts_down_to(levels, finest).split_beside_cuts(levels, finest);
     Ok(if at_contacts.element_count() > most { mesh } else { at_contacts })
 }

@@ -21,7 +21,7 @@ use rustc_hash::FxHashSet;
 use super::box_overlap::overlapping_pairs;
 use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
-use crate::scene::Scene;
+use crate::scene::{Scene, longest_edge};
 
 /// Least depth of a segment in an element for separating it, as a barycentric weight: a segment
 /// along the element's edge does not. Plain choice; no measurement was kept.
@@ -51,6 +51,11 @@ impl Mesh {
     /// Among triangles that each have more than 256 others near them, only the largest 256 touch
     /// the rest: this bounds the time for thousands of faces at one point.
     pub fn split_at_contacts(&self, levels: u32) -> Mesh {
+        self.split_at_contacts_down_to(levels, 0.0)
+    }
+
+    /// The same, without splitting elements no longer than `finest` (scene unit).
+    pub(crate) fn split_at_contacts_down_to(&self, levels: u32, finest: f64) -> Mesh {
         let count = self.depths.len();
         let tolerances: Vec<f64> =
             (0..count).map(|t| self.contact_distance(t, self.depth(t))).collect();
@@ -66,7 +71,13 @@ impl Mesh {
                 let corners = self.scene.corners(s);
                 plane.add_contacts(&corners, &outer_edges[s], &boxes[t], &mut segments);
             }
+            let longest = longest_edge(self.scene.corners(t));
+            let deepest = match longest > finest {
+                true => (longest / finest).log2().ceil().min(f64::from(Mesh::MAX_DEPTH)) as u32,
+                false => 0,
+            };
             let mut separated = vec![];
+            let levels = [levels, deepest];
             self.collect_separated(t, Cell::ROOT, &segments, levels, &mut separated);
             separated
         };
@@ -85,7 +96,7 @@ impl Mesh {
         t: usize,
         cell: Cell,
         segments: &[ContactSegment],
-        levels: u32,
+        [levels, deepest]: [u32; 2],
         separated: &mut Vec<(usize, Cell)>,
     ) {
         // Elements are at most `MAX_DEPTH` levels smaller.
@@ -105,14 +116,14 @@ impl Mesh {
             let touches = |segment: &ContactSegment| {
                 segment.gap <= distance && segment.separates(cell, MIN_PENETRATION)
             };
-            let deepest = (element_level + levels).min(Mesh::MAX_DEPTH);
+            let deepest = (element_level + levels).min(deepest);
             if cell.level >= deepest || !segments.iter().any(touches) {
                 return;
             }
             separated.push((t, cell));
         }
         for child in cell.children() {
-            self.collect_separated(t, child, &segments, levels, separated);
+            self.collect_separated(t, child, &segments, [levels, deepest], separated);
         }
     }
 
