@@ -54,11 +54,14 @@ pub(super) fn extrapolate_into_buried(samples: &mut SampledMesh) {
                 let step = positions[v] - positions[w];
                 let value = samples.reflected[w];
                 let extrapolated = value + gradients[numbers[w]] * step;
-                // Gradients next to a contact are steep.
+                // Gradients next to a contact are steep, and those of slivers may overflow.
+                let extrapolated = if extrapolated.is_finite() { extrapolated } else { value };
                 let value = extrapolated.clamp(value * 0.5, value * 2.0);
+                // Two vertices may be at one point.
+                let distance = step.length().max(samples.mesh.scene().coordinate_ulp());
                 let sum = &mut sums[numbers[v]];
-                sum.0 += value / step.length();
-                sum.1 += 1.0 / step.length();
+                sum.0 += value / distance;
+                sum.1 += 1.0 / distance;
             }
         }
     }

@@ -4,6 +4,9 @@
 mod bands;
 mod daylight;
 mod emit;
+mod gltf;
+#[path = "../common/gltf.rs"]
+mod gltf_files;
 mod heat;
 mod heat_tables;
 mod light;

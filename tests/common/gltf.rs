@@ -1,4 +1,5 @@
 //! glTF files that are made up: a document, and the numbers of its buffer.
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 use serde_json::{Value, json};
 

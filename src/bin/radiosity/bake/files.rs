@@ -54,8 +54,9 @@ const FORMATS: Names<Format> = &[
 pub struct Files {
     #[command(flatten)]
     output: Output,
-    /// Files: ply, vertices with radiosity and error; glb, the same for viewers of glTF; json, a
-    /// report; exr and png, a picture; csv, with --bands, a table
+    /// Files: ply, vertices with radiosity and error; glb, the same for viewers of glTF, or a glTF
+    /// scene with light at its own vertices; json, a report; exr and png, a picture; csv, with
+    /// --bands, a table
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "ply,glb,json,exr,png")]
     formats: List<Format>,
