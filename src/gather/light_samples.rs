@@ -225,11 +225,8 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
                 arriving += *seen * (brightness / all);
             }
         }
-        if missing == 0.0 {
-            arriving
-        } else {
-            arriving * (1.0 + missing / f64::max(cast, f64::MIN_POSITIVE))
-        }
+        // Where no ray of any was cast, no point of a light is above the horizon.
+        if cast > 0.0 { arriving * (1.0 + missing / cast) } else { arriving }
     }
 
     /// The largest irradiance of one ray of a stratum where some rays arrive and some do not,
