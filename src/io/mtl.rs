@@ -236,8 +236,8 @@ impl Library {
             (
                 WarningKind::Metal,
                 names(&is_metal),
-                "`Kd` is all that it reflects: as a mirror by `Ka` (metallic) and the smoothness in \
-                 `Ns`, the rest diffusely",
+                "`Kd` is all that it reflects: as a mirror by `Ka` (metallic) and the smoothness \
+                 in `Ns`, the rest diffusely",
             ),
             (
                 WarningKind::EmissionStrength,

@@ -150,8 +150,8 @@ pub struct SceneSettings {
 }
 
 impl SceneSettings {
-    /// Default of [`SceneSettings::max_reflectance`]: light is reflected by such a surface some fifty
-    /// times. Plain choice, between fresh snow or barium sulphate and fast convergence.
+    /// Default of [`SceneSettings::max_reflectance`]: light is reflected by such a surface some
+    /// fifty times. Plain choice, between fresh snow or barium sulphate and fast convergence.
     pub const MAX_REFLECTANCE: f64 = 0.98;
 
     /// Loads a scene, glTF, OBJ or STL, with the files that it names: see [`crate::load_scene`].

@@ -28,9 +28,10 @@
 //!
 //! Blender's exporter writes 3 for all opaque metals, with the metal's colour in `Kd`, `metallic`
 //! in `Ka`, 1000 (1 − roughness)² in `Ns`, and a `Ks` that has no effect on metals there. In files
-//! that begin with `# Blender` `Kd` is therefore all that such a metal reflects: of `metallic` times
-//! that a share by its roughness diffusely ([`diffuse_share_of_metal`]) and the rest as a mirror, as
-//! there is no gloss here. Metals with a `map_Kd` are diffuse, since mirrors have one colour.
+//! that begin with `# Blender` `Kd` is therefore all that such a metal reflects: of `metallic`
+//! times that a share by its roughness diffusely ([`diffuse_share_of_metal`]) and the rest as a
+//! mirror, as there is no gloss here. Metals with a `map_Kd` are diffuse, since mirrors have one
+//! colour.
 
 use crate::scene::{Rgb, Specular};
 

@@ -13,8 +13,8 @@ pub(crate) struct SceneTextures {
     /// Of the corners of each triangle; empty if no material has textures and they were not
     /// requested.
     pub coordinates: Vec<[DVec2; 3]>,
-    /// Colours of the corners of each triangle, by which reflectances with a texture are multiplied;
-    /// empty for white.
+    /// Colours of the corners of each triangle, by which reflectances with a texture are
+    /// multiplied; empty for white.
     pub colours: Vec<[Vec3; 3]>,
     /// Of the materials with textures, by their indices.
     pub of_materials: BTreeMap<u32, MaterialTextures>,

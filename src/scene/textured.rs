@@ -26,8 +26,8 @@ pub(crate) type Piece = (usize, [[f64; 2]; 3]);
 
 impl Scene {
     /// Texture coordinates (u, v) of the corners of triangle `t`, as in the file; `None` if the
-    /// scene has no textures, unless they were [kept](crate::SceneSettings::texture_coordinates). Not
-    /// finite for a corner without them.
+    /// scene has no textures, unless they were [kept](crate::SceneSettings::texture_coordinates).
+    /// Not finite for a corner without them.
     pub fn texture_coordinates(&self, t: usize) -> Option<[DVec2; 3]> {
         self.textures.coordinates.get(t).copied()
     }
@@ -84,8 +84,8 @@ impl Scene {
         self.filtered(t, map, self.material(t).exitance, barycentric, share, Rgb::ONE)
     }
 
-    /// The value of `map` times `colour` at a point of triangle `t`, filtered over a fraction of its
-    /// area, for this `mean` of the material; the mean if there is no map.
+    /// The value of `map` times `colour` at a point of triangle `t`, filtered over a fraction of
+    /// its area, for this `mean` of the material; the mean if there is no map.
     fn filtered(
         &self,
         t: usize,
@@ -129,8 +129,8 @@ impl Scene {
         pieces.iter().zip(means).map(scaled).collect()
     }
 
-    /// Mean of the texture of reflectance over the solid part of each of `pieces`, times the mean of
-    /// the colours of vertices; none for those without one. Exact unless both differ on a piece.
+    /// Mean of the texture of reflectance over the solid part of each of `pieces`, times the mean
+    /// of the colours of vertices; none for those without one. Exact unless both differ on a piece.
     fn reflectance_means(&self, pieces: &[Piece]) -> Vec<Option<Rgb>> {
         let mut means = self.solid_means(pieces, |textures| textures.reflectance.as_ref());
         for (mean, &(t, [a, b, c])) in means.iter_mut().zip(pieces) {

@@ -13,7 +13,8 @@ use crate::progress;
 #[derive(Args)]
 pub struct CameraOption {
     /// Camera of the picture: eye, target, vertical field of view in degrees, and the direction up
-    /// [0,1,0]; or the name of one in a glTF file [default: its first, or chosen, and in the report]
+    /// [0,1,0]; or the name of one in a glTF file [default: its first, or chosen, and in the
+    /// report]
     #[arg(long, value_name = "NUMBERS", value_parser = given)]
     camera: Option<Given>,
     /// The camera, where it is known before the light is.

@@ -76,8 +76,8 @@ impl Luminaires {
         self.placed.is_empty()
     }
 
-    /// `scene` with these luminaires beside its own, whose intensities are per metre. Without an aim
-    /// they look down.
+    /// `scene` with these luminaires beside its own, whose unit of length is the metre. Without an
+    /// aim they look down.
     ///
     /// # Errors
     /// Those of [`Scene::with_luminaires`].

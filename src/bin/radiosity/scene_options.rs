@@ -83,8 +83,8 @@ pub struct SceneOptions {
     #[arg(long, value_name = "NAME", hide = true)]
     pub scene: Option<String>,
     /// What intensities of lamps in a glTF file are, beside what surfaces emit in W/(m² sr).
-    /// candela: as they are; watts: lumens, at 683 lm/W; auto: watts in files by Blender whose lamps
-    /// have round numbers of them
+    /// candela: as they are; watts: lumens, at 683 lm/W; auto: watts in files by Blender whose
+    /// lamps have round numbers of them
     #[arg(long, value_name = "UNITS", hide = true, default_value = "auto")]
     #[arg(value_parser = one_of(LAMP_UNITS))]
     lamp_units: LampUnits,

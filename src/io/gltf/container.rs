@@ -83,8 +83,8 @@ impl<'a> Container<'a> {
         serde_json::from_slice(self.text()).map_err(wrong)
     }
 
-    /// The buffer that new numbers of `document` are in, and how many bytes it has before them: that
-    /// of the binary file, or one of its own.
+    /// The buffer that new numbers of `document` are in, and how many bytes it has before them:
+    /// that of the binary file, or one of its own.
     pub fn buffer_of_new(&self, document: &Document) -> (usize, usize) {
         match (self.binary, document.buffers.first()) {
             (Some(binary), Some(Buffer { uri: None, .. })) => (0, binary.len().next_multiple_of(4)),

@@ -309,8 +309,8 @@ impl MeshReader<'_, '_> {
         Ok(Some(Local { positions, corners, coordinates, colours, material }))
     }
 
-    /// The positions of `vertices`: at rest, with the weights of morph targets, and as the joints of
-    /// a skin stand.
+    /// The positions of `vertices`: at rest, with the weights of morph targets, and as the joints
+    /// of a skin stand.
     fn posed(
         &self,
         node: &Node,

@@ -38,8 +38,8 @@ const SAME_SURFACE: f64 = 0.94;
 ///
 /// A vertex has the light of the baked vertices at its point in its node's group, of those whose
 /// normals are within 20° of its own; without normals, of all. Both sides of a surface that are lit
-/// share a vertex: it has their mean. Instances (`EXT_mesh_gpu_instancing`) are left out, since they
-/// share vertices.
+/// share a vertex: it has their mean. Instances (`EXT_mesh_gpu_instancing`) are left out, since
+/// they share vertices.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when a file cannot be read or written, [`crate::ErrorKind::Scene`]

@@ -3,9 +3,9 @@
 //! | of the file | here |
 //! |---|---|
 //! | base colour × texture × `COLOR_0` | reflectance, of what is no metal |
-//! | metallic, roughness, their texture | a share of that by the metal's roughness ([`diffuse_share_of_metal`]); the rest as a mirror |
+//! | metallic, roughness, their texture | a share of metal ([`diffuse_share_of_metal`]) |
 //! | emissive × texture × `KHR_materials_emissive_strength` | radiance: exitance over π |
-//! | `alphaMode` `MASK`, and `BLEND` with a texture | cut-outs: solid from the cutoff, and from a half on |
+//! | `alphaMode` `MASK`; `BLEND` with a texture | cut-outs: solid from the cutoff; from a half on |
 //! | `BLEND` below a half | a pane that lets 1 − alpha pass |
 //! | `KHR_materials_transmission` of a half and more, `ior`, `volume` | glass of the base colour |
 //! | `KHR_materials_diffuse_transmission` | transmittance |
@@ -14,8 +14,9 @@
 //!
 //! Without `pbrMetallicRoughness` it is no metal, though the format's default is one. Without a
 //! metallic factor and texture it is one if at least half of the file's materials have either: then
-//! what wrote the file leaves out the default of 1 alone, and else it leaves out all. `doubleSided` says which faces are drawn,
-//! not which ones light reaches: [`Sides::Auto`](crate::scene::Sides) finds these.
+//! what wrote the file leaves out the default of 1 alone, and else it leaves out all. `doubleSided`
+//! says which faces are drawn, not which ones light reaches: [`Sides::Auto`](crate::scene::Sides)
+//! finds these.
 
 use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::PI;
@@ -220,7 +221,7 @@ impl MaterialReader<'_, '_> {
                     material.specular = Some(Specular::Mirror { reflectance: mirror * base });
                 }
                 if metallic > 0.0 {
-                    let done = "by its roughness a share is reflected diffusely, and the rest as by a \
+                    let done = "by its roughness a share is reflected diffusely, the rest as by a \
                                 mirror, which the light solution leaves out";
                     self.note(k, WarningKind::Metal, done, name)?;
                 }

@@ -21,8 +21,8 @@ type Segment = [FinePoint; 2];
 /// Rounds after which those that still cross are left so: they run within a step of each other.
 const ROUNDS: usize = 16;
 
-/// `segments` in parts. What crosses in the inside of the triangle stays off its sides, whose points
-/// are those of the triangle beyond, too.
+/// `segments` in parts. Crossings inside the triangle stay off its sides, whose points are those of
+/// the triangle beyond, too.
 pub(super) fn split_at_crossings(segments: &[[LatticePoint; 2]]) -> Vec<Segment> {
     let fine = |point: LatticePoint| point.map(|k| FINER * i64::from(k));
     let mut all: Vec<Segment> = segments.iter().map(|ends| ends.map(fine)).collect();

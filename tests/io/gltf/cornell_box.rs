@@ -35,8 +35,8 @@ fn as_obj(scene: &Scene) -> (String, String) {
     (obj, mtl)
 }
 
-/// The same scene as glTF: a node and a mesh for each group, a primitive for each of its runs of one
-/// material.
+/// The same scene as glTF: a node and a mesh for each group, a primitive for each of its runs of
+/// one material.
 fn as_gltf(scene: &Scene) -> Gltf {
     let material = |material: &radiosity::Material| {
         let [r, g, b] = material.reflectance.to_array();

@@ -9,7 +9,8 @@ use crate::common::gltf::{Gltf, HALVES, SQUARE};
 fn squares(nodes: serde_json::Value) -> Gltf {
     let mut gltf = Gltf::new(nodes);
     gltf.add_square(0);
-    gltf.json["materials"] = json!([{ "name": "grey", "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1] } }]);
+    let pbr = json!({ "baseColorFactor": [0.5, 0.5, 0.5, 1] });
+    gltf.json["materials"] = json!([{ "name": "grey", "pbrMetallicRoughness": pbr }]);
     gltf
 }
 

@@ -16,7 +16,8 @@ fn floor_under(light: Value) -> Gltf {
     let mut gltf = Gltf::new(json!([
         { "mesh": 0, "name": "floor", "scale": [4, 1, 4], "translation": [-2, 0, 2],
           "rotation": [-(0.5f64.sqrt()), 0, 0, 0.5f64.sqrt()] },
-        { "name": "lamp", "translation": [0, 2, 0], "rotation": [-(0.5f64.sqrt()), 0, 0, 0.5f64.sqrt()],
+        { "name": "lamp", "translation": [0, 2, 0],
+          "rotation": [-(0.5f64.sqrt()), 0, 0, 0.5f64.sqrt()],
           "extensions": { "KHR_lights_punctual": { "light": 0 } } },
     ]));
     // The scale turns with the square: before that its y is the floor's z.
@@ -28,9 +29,9 @@ fn floor_under(light: Value) -> Gltf {
     gltf
 }
 
-/// Compares the light of the lamp all over the floor with a closed form. Between the cones of a spot
-/// it is linear in 128 steps of the angle: off by 1/8 of their square times the second derivative,
-/// 1e-4 of the intensity at most.
+/// Compares the light of the lamp all over the floor with a closed form. Between the cones of a
+/// spot it is linear in 128 steps of the angle: off by 1/8 of their square times the second
+/// derivative, 1e-4 of the intensity at most.
 fn check(gltf: &Gltf, irradiance: impl Fn(DVec3) -> f64) {
     let mesh = Mesh::new(read(gltf).unwrap(), f64::INFINITY).unwrap();
     let corners = vec![[0; 3]; mesh.element_count()];
@@ -159,7 +160,8 @@ fn lamps_leave_the_sky_dark_and_the_brightest_sun_shines() {
 fn cameras_look_along_minus_z() {
     let mut gltf = Gltf::new(json!([
         { "camera": 0, "name": "flat" },
-        { "camera": 1, "name": "door", "translation": [1, 2, 3], "rotation": [0, 0.5f64.sqrt(), 0, 0.5f64.sqrt()] },
+        { "camera": 1, "name": "door", "translation": [1, 2, 3],
+          "rotation": [0, 0.5f64.sqrt(), 0, 0.5f64.sqrt()] },
     ]));
     gltf.json["cameras"] = json!([
         { "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 9, "znear": 1 } },

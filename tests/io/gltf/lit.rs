@@ -43,7 +43,8 @@ fn floats(json: &Value, binary: &[u8], accessor: &Value) -> Vec<[f32; 3]> {
 fn floor_and_wall() -> Gltf {
     let turn = [0.5f64.sqrt(), 0.0, 0.0, 0.5f64.sqrt()];
     let mut gltf = Gltf::new(json!([
-        { "mesh": 0, "name": "floor", "rotation": [-turn[0], 0, 0, turn[3]], "extras": { "a": 0.1 } },
+        { "mesh": 0, "name": "floor", "rotation": [-turn[0], 0, 0, turn[3]],
+          "extras": { "a": 0.1 } },
         { "mesh": 0, "name": "wall", "scale": [1, 0.7, 1], "translation": [0, 0, -0.5] },
         { "name": "empty", "extensions": { "ACME_thing": [1, 2.50] } },
     ]));

@@ -60,7 +60,8 @@ fn rough_metals_reflect_a_share() {
 /// Of materials without a metallic factor: none is a metal, unless other materials have one.
 #[test]
 fn omitted_metallic_factors() {
-    let omitted = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "roughnessFactor": 0 } });
+    let pbr = json!({ "baseColorFactor": [0.5, 0.5, 0.5, 1], "roughnessFactor": 0 });
+    let omitted = json!({ "pbrMetallicRoughness": pbr });
     let alone = read(&Gltf::of_material(omitted.clone())).unwrap();
     assert_eq!(alone.materials()[0].reflectance, Rgb::splat(0.5));
     assert!(has_warning(&alone, WarningKind::MetalByDefault));

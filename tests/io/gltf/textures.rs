@@ -82,7 +82,8 @@ fn images_are_found_in_data_and_files() {
     check_quarters(&read_scene("it.gltf", json.as_bytes(), &files).unwrap(), colours());
     // One pixel of red as a data URI; the texture's image is missing without its file.
     gltf.json["images"] = json!([{ "uri": "data:image/png;base64,\
-        iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC" }]);
+        iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4\
+        z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC" }]);
     let json = gltf.json.to_string();
     check_quarters(
         &read_scene("it.gltf", json.as_bytes(), &files[1..]).unwrap(),

@@ -204,8 +204,8 @@ impl Files {
         }
         if instances > 0 {
             eprintln!(
-                "warning: {instances} instances share their vertices, and have no light in the glTF \
-                 file: --refine writes a mesh for each"
+                "warning: {instances} instances share their vertices, and have no light in the \
+                 glTF file: --refine writes a mesh for each"
             );
         }
         Ok(())
