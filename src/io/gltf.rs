@@ -93,7 +93,7 @@ impl Fault {
     /// Data compressed by an extension that is not read.
     fn compressed(extension: &str) -> Fault {
         let found = format!("a mesh compressed by {extension}, which is not read");
-        Fault::new(found, "uncompress it: import and export it in Blender, without compression")
+        Fault::new(found, "uncompress it: npx @gltf-transform/cli copy IN.glb OUT.glb")
     }
 
     /// The same in this part of the file.

@@ -80,8 +80,8 @@ pub struct SceneOptions {
     #[arg(long)]
     strict: bool,
     /// Scene of a glTF file, by its name or number [its own]
-    #[arg(long, value_name = "NAME", hide = true)]
-    pub scene: Option<String>,
+    #[arg(long = "scene", value_name = "NAME", hide = true)]
+    pub scene_name: Option<String>,
     /// What intensities of lamps in a glTF file are, beside what surfaces emit in W/(m² sr).
     /// candela: as they are; watts: lumens, at 683 lm/W; auto: watts in files by Blender whose
     /// lamps have round numbers of them
@@ -124,7 +124,7 @@ impl SceneOptions {
             settings.sides = self.sides;
             settings.specular = self.specular;
             settings.texture_coordinates = self.texture_coordinates;
-            settings.scene.clone_from(&self.scene);
+            settings.scene.clone_from(&self.scene_name);
             settings.lamp_units = self.lamp_units;
             settings.sky = self.sky.while_reading();
             if !luminaires.is_empty() {

@@ -105,7 +105,8 @@ impl Files {
     /// can be written, before any work is done for it.
     pub fn name_after(&mut self, scene: &Path, reading: &SceneOptions) -> Result<(), Error> {
         self.metres = reading.unit;
-        let of_scene = |ending| Source { path: scene.into(), ending, scene: reading.scene.clone() };
+        let of_scene =
+            |ending| Source { path: scene.into(), ending, scene: reading.scene_name.clone() };
         self.source = gltf_ending(scene)?.map(of_scene);
         // Not over the scene itself.
         let ending = if self.source.is_some() { "baked" } else { "" };
