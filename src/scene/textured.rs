@@ -53,7 +53,7 @@ impl Scene {
     /// The colour that a textured reflectance is multiplied by at a point: of vertices, or white.
     pub(super) fn colour(&self, t: usize, [u, v]: [f64; 2]) -> Rgb {
         let of_point = |&[a, b, c]: &[Vec3; 3]| {
-            let [a, b, c] = [a, b, c].map(|colour| colour.as_dvec3());
+            let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
             a * (1.0 - u - v) + b * u + c * v
         };
         self.textures.colours.get(t).map_or(Rgb::ONE, of_point)

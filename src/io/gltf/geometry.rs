@@ -1,6 +1,7 @@
 //! Meshes of a glTF scene as triangles of the world, once for each node and instance that has one.
 
 use std::cell::Cell;
+use std::collections::hash_map::Entry;
 
 use glam::{DAffine3, DMat4, DVec2, DVec3};
 use rustc_hash::FxHashMap;
@@ -101,11 +102,12 @@ impl Geometry {
                 own = reader.mesh(node, mesh, &mut geometry).map_err(at)?;
                 &own
             } else {
-                if !known.contains_key(&mesh) {
-                    let read = reader.mesh(node, mesh, &mut geometry).map_err(at)?;
-                    known.insert(mesh, read);
+                match known.entry(mesh) {
+                    Entry::Occupied(read) => read.into_mut(),
+                    Entry::Vacant(unread) => {
+                        unread.insert(reader.mesh(node, mesh, &mut geometry).map_err(at)?)
+                    }
                 }
-                &known[&mesh]
             };
             let name = unique(name(document, placed.node), &mut names);
             let mut group = Group { node: placed.node, world: placed.world, is_instance: false };

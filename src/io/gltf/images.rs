@@ -18,6 +18,9 @@ use crate::scene::texture::Texture;
 /// Image of the colours, and of metallic and roughness with their factors, each if there is one.
 type Colours = (Option<usize>, Option<Metal>);
 
+/// The same, with the bits of the factors.
+type ColourKey = (Option<usize>, Option<(usize, u64, u64)>);
+
 /// An image of metallic (blue) and roughness (green), each by a factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Metal {
@@ -42,7 +45,7 @@ pub(super) struct Images<'a, 'b> {
     document: &'a Document,
     #[cfg_attr(not(feature = "textures"), allow(dead_code, reason = "no image is read"))]
     buffers: &'a Buffers<'b>,
-    colours: FxHashMap<(Option<usize>, Option<(usize, u64, u64)>), Result<Arc<Texture>, Unread>>,
+    colours: FxHashMap<ColourKey, Result<Arc<Texture>, Unread>>,
     masks: FxHashMap<(usize, u64), Result<Coverage, Unread>>,
     #[cfg(feature = "textures")]
     decoder: Decoder,
