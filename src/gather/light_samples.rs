@@ -177,8 +177,10 @@ impl<'a, L: SampledLeaf> LightSamples<'a, L> {
             let [dx, dy] = r2_point(j, 0.0);
             let (leaf, x, probability) = self.tree.choose(node, (x + dx).fract());
             let sample = leaf.sample([x, (y + dy).fract(), z], &self.point);
+            // Rounding may choose a leaf of a probability of 0.
             let weight = sample.irradiance / probability;
-            (weight != Rgb::ZERO).then_some(LightRay { stratum, leaf, sample, weight })
+            let is_seen = weight.is_finite() && weight != Rgb::ZERO;
+            is_seen.then_some(LightRay { stratum, leaf, sample, weight })
         })
     }
 
