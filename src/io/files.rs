@@ -210,6 +210,15 @@ pub(super) fn read_bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
 }
 
+/// Whether a file of this name and content is to be glTF: binary, or a JSON text.
+pub(super) fn is_gltf(path: &Path, bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let first = text.iter().find(|byte| !byte.is_ascii_whitespace());
+    let extension = path.extension().unwrap_or_default();
+    let is_named = ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known));
+    is_named || bytes.starts_with(b"glTF") || first == Some(&b'{')
+}
+
 /// A copy of `bytes`, if there are at most `most`.
 pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes.into()) }

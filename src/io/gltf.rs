@@ -12,6 +12,7 @@
 mod accessors;
 mod container;
 mod document;
+mod fault;
 mod geometry;
 mod images;
 mod lights;
@@ -26,17 +27,17 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::files::{FileSource, MAX_BYTES, read_bytes};
+use super::files::{FileSource, MAX_BYTES, is_gltf, read_bytes};
 use super::given::{check_names, emit_on_both_sides};
 use super::lights::sky_and_warning;
 use super::obj::repairs::Repairs;
-use super::settings::is_gltf;
 use super::{SceneSettings, cannot_read};
 use crate::camera::Camera;
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::scene::{Scene, SceneTextures, Warning, WarningKind};
 use container::{Buffers, Container};
 use document::Document;
+use fault::Fault;
 use geometry::Geometry;
 use images::Images;
 pub use lights::LampUnits;
@@ -72,41 +73,6 @@ const KNOWN_EXTENSIONS: [&str; 24] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
-
-/// What is wrong in a file, and the correction; its place is added by those who know it.
-#[derive(Clone, Debug)]
-struct Fault {
-    found: String,
-    remedy: String,
-}
-
-impl Fault {
-    fn new(found: impl Into<String>, remedy: impl Into<String>) -> Fault {
-        Fault { found: found.into(), remedy: remedy.into() }
-    }
-
-    /// An index that is not below the number of these items.
-    fn index(what: &str, index: usize, count: usize) -> Fault {
-        Fault::new(format!("{what} {index}, of {count}"), format!("must be below {count}"))
-    }
-
-    /// Data compressed by an extension that is not read.
-    fn compressed(extension: &str) -> Fault {
-        let found = format!("a mesh compressed by {extension}, which is not read");
-        Fault::new(found, "uncompress it: npx @gltf-transform/cli copy IN.glb OUT.glb")
-    }
-
-    /// The same in this part of the file.
-    fn inside(mut self, part: &str) -> Fault {
-        self.found = format!("{part}: {}", self.found);
-        self
-    }
-
-    /// The error at this place.
-    fn at(self, place: impl Into<String>) -> Error {
-        Error::new(ErrorKind::Scene, place, self.found, self.remedy)
-    }
-}
 
 /// The scene of the glTF file `path` with this content.
 pub(super) fn read_scene(
@@ -250,7 +216,7 @@ impl Geometry {
 /// is binary, else `gltf`.
 ///
 /// # Errors
-/// [`ErrorKind::File`] if the file cannot be read.
+/// [`crate::ErrorKind::File`] if the file cannot be read.
 pub fn gltf_ending(path: impl AsRef<Path>) -> Result<Option<&'static str>, Error> {
     let path = path.as_ref();
     let cannot = |e| cannot_read(path, e, "give a readable scene");
@@ -265,7 +231,8 @@ pub fn gltf_ending(path: impl AsRef<Path>) -> Result<Option<&'static str>, Error
 /// files.
 ///
 /// # Errors
-/// [`ErrorKind::File`] if the file cannot be read, [`ErrorKind::Scene`] if its JSON cannot.
+/// [`crate::ErrorKind::File`] if the file cannot be read, [`crate::ErrorKind::Scene`] if its JSON
+/// cannot.
 pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<(String, Camera)>, Error> {
     let path = path.as_ref();
     let at_file = |fault: Fault| fault.at(path.display().to_string());

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use super::files::{self, FileSource, MAX_BYTES};
+use super::files::{self, FileSource, MAX_BYTES, is_gltf};
 #[cfg(feature = "glb")]
 use super::gltf::{self, LampUnits};
 use super::specular::SpecularSurfaces;
@@ -250,13 +250,4 @@ impl Default for SceneSettings {
             lamp_units: LampUnits::Auto,
         }
     }
-}
-
-/// Whether a file of this name and content is to be glTF: binary, or a JSON text.
-pub(super) fn is_gltf(path: &Path, bytes: &[u8]) -> bool {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let first = text.iter().find(|byte| !byte.is_ascii_whitespace());
-    let extension = path.extension().unwrap_or_default();
-    let is_named = ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known));
-    is_named || bytes.starts_with(b"glTF") || first == Some(&b'{')
 }

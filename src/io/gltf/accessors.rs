@@ -1,8 +1,8 @@
 //! Numbers of a glTF buffer: accessors of any component type, sparse ones too.
 
-use super::Fault;
 use super::container::{Buffers, View};
 use super::document::{Accessor, Document};
+use super::fault::Fault;
 
 /// Largest number of items that are 0 since the file has no data of them. Plain choice.
 const MOST_WITHOUT_DATA: usize = 1 << 20;

@@ -17,8 +17,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::super::files::{FileSource, MAX_BYTES};
-use super::Fault;
 use super::document::{Buffer, Document, Image};
+use super::fault::Fault;
 use crate::error::{quoted, shortened};
 
 /// First bytes of a binary file.

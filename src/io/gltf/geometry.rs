@@ -7,10 +7,10 @@ use glam::{DAffine3, DMat4, DVec2, DVec3};
 use rustc_hash::FxHashMap;
 use serde_json::Value;
 
-use super::Fault;
 use super::accessors::Values;
 use super::container::Buffers;
 use super::document::{Document, Instances, Node, Primitive};
+use super::fault::Fault;
 use super::nodes::{Nodes, Placed, name, of_parts};
 use crate::scene::Triangle;
 

@@ -9,16 +9,17 @@
 
 use std::path::Path;
 
-use glam::{DAffine3, DVec3};
-use rustc_hash::FxHashMap;
+use glam::{DAffine3, DMat3, DVec3};
+use rustc_hash::{FxHashMap, FxHashSet};
 use serde_json::{Value, json};
 
 use super::accessors::Values;
 use super::container::{Buffers, Container};
 use super::document::Document;
+use super::fault::Fault;
 use super::geometry::{Geometry, Group, MeshReader};
+use super::materials;
 use super::nodes::Nodes;
-use super::{Fault, materials};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::io::files::{FileSource, MAX_BYTES, read_bytes};
@@ -115,12 +116,12 @@ impl LightOfGroups {
     fn new(light: &GatheredMesh) -> LightOfGroups {
         let (surface, mesh) = (&light.surface, &light.mesh);
         let mut all: FxHashMap<(u32, [u64; 3]), Vec<AtPoint>> = FxHashMap::default();
-        let mut seen: FxHashMap<(u32, u32), ()> = FxHashMap::default();
+        let mut seen: FxHashSet<(u32, u32)> = FxHashSet::default();
         for (face, &element) in surface.faces.iter().zip(&surface.elements) {
             let t = mesh.triangle(mesh.element(element as usize));
             let group = mesh.scene().triangles()[t].group;
             for &v in face {
-                if seen.insert((group, v), ()).is_none() {
+                if seen.insert((group, v)) {
                     let normal = surface.normals[v as usize];
                     let irradiance = surface.irradiance.get(v as usize).copied();
                     let at = AtPoint { normal, irradiance: irradiance.unwrap_or(Rgb::ZERO) };
@@ -213,9 +214,9 @@ impl Writer<'_, '_> {
                 let normals = normals.filter(|values| values.has_components(3));
                 let turn = normal_transform(group.world);
                 for (v, p) in positions.into_iter().enumerate() {
-                    let normal = normals.as_ref().map(|normals: &Values<'_>| {
-                        turn.transform_vector3(DVec3::from_array(normals.get(v)))
-                    });
+                    let normal = normals
+                        .as_ref()
+                        .map(|normals: &Values<'_>| turn * DVec3::from_array(normals.get(v)));
                     let normal = normal.and_then(DVec3::try_normalize);
                     let found = self.light.at(number, group.world.transform_point3(p), normal);
                     match found {
@@ -239,9 +240,7 @@ impl Writer<'_, '_> {
             .any(|(k, node)| !self.is_placed[k] || node.extensions.instances.is_some());
         let number = if self.known.contains_key(&mesh) || is_shared {
             let copy = self.document_mesh(mesh);
-            let meshes = self.json["meshes"].as_array_mut().expect("it has the mesh");
-            meshes.push(copy);
-            meshes.len() - 1
+            push(&mut self.json, "meshes", copy)
         } else {
             mesh
         };
@@ -321,11 +320,11 @@ fn push(json: &mut Value, list: &str, item: Value) -> usize {
 }
 
 /// From normals of a mesh to those of the world, up to their length.
-fn normal_transform(world: DAffine3) -> DAffine3 {
+fn normal_transform(world: DAffine3) -> DMat3 {
     let m = world.matrix3;
     // Cofactors: the inverse transpose times the determinant, which may be 0.
     let (x, y, z) = (m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-    DAffine3::from_cols(x, y, z, DVec3::ZERO)
+    DMat3::from_cols(x, y, z)
 }
 
 /// Whether light is the same but for `error`, as a share of its mean.

@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
-use super::Fault;
 use super::document::{Document, Node};
+use super::fault::Fault;
 use crate::error::quoted;
 
 /// A node of the scene that is read.

@@ -110,9 +110,9 @@ mod tests {
     use fastrand::Rng;
     use glam::DVec2;
 
-    /// Random segments, long ones and ones of few steps: afterwards no two cross, but for some whose
-    /// crossing is rounded to an end of one and lies beyond that of the other. Half a step of
-    /// rounding is a few where the angle is small: 3.8 is the most in 5000 rounds.
+    /// Random segments, long ones and ones of few steps: afterwards no two cross, but for some
+    /// whose crossing is rounded to an end of one and lies beyond that of the other. Half a step of
+    /// rounding is a few where the angle is small: 3.8 is the maximum in 5000 rounds.
     #[test]
     fn no_two_parts_cross() {
         let mut rng = Rng::with_seed(3);
