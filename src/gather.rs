@@ -21,6 +21,7 @@ mod further_bounces;
 pub(crate) mod gather_points;
 mod gathered_mesh;
 mod interpolated_refinement;
+pub(crate) mod kept_mesh;
 pub(crate) mod light_samples;
 pub(crate) mod light_tree;
 pub(crate) mod lights;

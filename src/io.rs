@@ -12,7 +12,9 @@
 //! | glTF 2.0 binary (feature `glb`) | `write_glb` | the same by groups, for viewers |
 //! | OpenEXR (feature `exr`) | `write_exr` | an image, linear radiance |
 //! | both (feature `light-map`) | `write_light_map_exr`, `write_light_map_glb` | a light map |
+//! | KTX 2.0 (feature `light-map`) | `write_light_map_ktx2` | a light map, with a common exponent |
 //! | PNG (feature `png`) | `write_png` | an image, tone-mapped |
+//! | PNG (and `light-map`) | `write_light_map_rgbm` | a light map, with a common factor |
 //! | CSV, Matrix Market | [`view_factors`] | view factors between groups |
 //! | NumPy's `.npz` (feature `npz`) | `write_npz`, `read_npz` | the same, as SciPy's sparse rows |
 
@@ -25,6 +27,8 @@ mod given;
 mod glb;
 #[cfg(feature = "glb")]
 mod gltf;
+#[cfg(feature = "light-map")]
+mod ktx2;
 mod lights;
 mod masks;
 mod mtl;
@@ -39,6 +43,8 @@ mod ply_reader;
 mod png;
 #[cfg(all(feature = "exr", feature = "textures"))]
 mod radiance;
+#[cfg(all(feature = "png", feature = "light-map"))]
+mod rgbm;
 mod settings;
 mod specular;
 mod stl;
@@ -63,8 +69,12 @@ pub use self::glb::write_light_map_glb;
 pub use self::glb::{GlbSettings, write_glb};
 #[cfg(feature = "glb")]
 pub use self::gltf::{LampUnits, LitVertices, gltf_ending, read_cameras, write_lit_gltf};
+#[cfg(feature = "light-map")]
+pub use self::ktx2::write_light_map_ktx2;
 #[cfg(feature = "png")]
 pub use self::png::{write_png, write_png_with_tone};
+#[cfg(all(feature = "png", feature = "light-map"))]
+pub use self::rgbm::{rgbm_range, write_light_map_rgbm};
 pub use epw::{Weather, WeatherRecord, epw_from_text, read_epw};
 pub use files::read_text;
 #[cfg(feature = "npz")]

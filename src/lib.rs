@@ -119,6 +119,7 @@ pub mod grid;
 pub mod heat;
 pub mod hemicube;
 pub mod io;
+pub mod kept_mesh;
 mod light;
 #[cfg(feature = "light-map")]
 pub mod light_map;

@@ -30,7 +30,6 @@ use rustc_hash::FxHashMap;
 use crate::accuracy::Measure;
 use crate::error::{Error, ErrorKind};
 use crate::gather::near_surface::is_near;
-#[cfg(feature = "light-map")]
 use crate::gather::two_sided::TwoSidedPoint;
 use crate::gather::{GatherPoint, GatheredMesh, PointIrradiance, RadiosityField};
 use crate::light::PathTracer;
@@ -38,7 +37,8 @@ use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::random::random_numbers;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
-pub(crate) use missed_light::{Goal, PathOrigin, missed_light, scales};
+pub(crate) use missed_light::scales;
+use missed_light::{Goal, PathOrigin, missed_light};
 
 /// Edge of the finest cells, at least, over that of the box around all points: of a grid of a
 /// million probes 1 000 a side are parted. Plain choice.
@@ -102,6 +102,85 @@ pub fn correct_by_paths(
     let of_gathers = noise.iter().sum::<Rgb>() / (open.len() as f64).max(1.0).powi(2);
     correction.mean_error = (correction.mean_error.powf(2.0) + of_gathers).map(f64::sqrt);
     Ok(Some(correction))
+}
+
+/// A point of a surface, and what was gathered there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GatheredPoint {
+    pub point: TwoSidedPoint,
+    /// Area that it stands for, scene unit squared.
+    pub area: f64,
+    /// Irradiance, W/m² per channel.
+    pub irradiance: Rgb,
+    /// See [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
+    pub near_paths: bool,
+}
+
+/// Irradiance at points of surfaces, corrected by paths.
+pub(crate) struct CorrectedSurface {
+    /// Irradiance of each, W/m² per channel.
+    pub irradiance: Vec<Rgb>,
+    /// Standard error of what paths added to each, W/m²: a length over the channels.
+    pub standard_error: Vec<f64>,
+    /// Root mean square over area of those standard errors, as shares.
+    pub error: f64,
+    /// Number of paths.
+    pub paths: usize,
+}
+
+/// How exact light at points of surfaces is to be, and is without paths.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfaceGoal {
+    /// Root mean square over area of the errors by what `light` misses, as shares.
+    pub error: f64,
+    /// The estimate of what is missed, and a bound on it, as shares.
+    pub expected: [f64; 2],
+    /// Points darker than this share of the mean count as that bright.
+    pub floor: f64,
+    /// Edge of the finest cells of points that share paths, scene unit.
+    pub finest: f64,
+}
+
+/// Corrects what was gathered of `light` at `count` points, which `point` gives by number, until the
+/// error of `goal` is reached or there are as many paths as can be. See [`correct_by_paths`] for
+/// `progress`.
+pub(crate) fn correct_surface(
+    light: &GatheredMesh,
+    count: usize,
+    point: impl Fn(usize) -> GatheredPoint + Sync,
+    goal: &SurfaceGoal,
+    progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Option<CorrectedSurface> {
+    let scales = scales((0..count).map(|k| point(k).irradiance.length()), goal.floor);
+    let bounds = light.mesh.scene().bounds();
+    let origin = |(k, &scale): (usize, &f64)| {
+        let GatheredPoint { point, area, .. } = point(k);
+        PathOrigin {
+            position: (point.point.position - bounds.low) / bounds.diagonal(),
+            normal: point.point.normal,
+            scale,
+            area,
+        }
+    };
+    let origins: Vec<PathOrigin> = scales.iter().enumerate().map(origin).collect();
+    let missing = MissingLight::new(light);
+    let sample = |k: usize, path: usize| {
+        let GatheredPoint { point, near_paths, .. } = point(k);
+        missing.irradiance_two_sided(&point, near_paths, path).to_array()
+    };
+    let finest = goal.finest / bounds.diagonal();
+    let (expected, error) = (goal.expected, Goal::Mean(goal.error));
+    let found = missed_light(&origins, finest, expected, &error, sample, progress)?;
+    let corrected = |(k, scale): (usize, &f64)| {
+        // Irradiance is not negative, and its correction is noisy.
+        (point(k).irradiance + *scale * Rgb::from_array(found.missed[k])).max(Rgb::ZERO)
+    };
+    Some(CorrectedSurface {
+        irradiance: scales.iter().enumerate().map(corrected).collect(),
+        standard_error: scales.iter().zip(&found.variance).map(|(s, v)| s * v.sqrt()).collect(),
+        error: found.error,
+        paths: found.paths,
+    })
 }
 
 /// A value that paths correct: a number or more for each channel.
@@ -221,13 +300,7 @@ impl MissingLight<'_> {
     /// Irradiance that is missed at a point of a surface, by path number `path`, W/m². With
     /// `near_paths` what near surfaces reflect is not the field's, as in
     /// [`IrradianceSample::near_paths`](crate::gather::IrradianceSample::near_paths).
-    #[cfg(feature = "light-map")]
-    pub fn irradiance_two_sided(
-        &self,
-        point: &TwoSidedPoint,
-        near_paths: bool,
-        path: usize,
-    ) -> Rgb {
+    fn irradiance_two_sided(&self, point: &TwoSidedPoint, near_paths: bool, path: usize) -> Rgb {
         let [own, other] = point.shares();
         let front = own * self.irradiance_past(&point.point, near_paths, path);
         if other == Rgb::ZERO {

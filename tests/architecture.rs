@@ -51,6 +51,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy backend bake error gather geometry mesh path_correction progress sampling scene \
          vertex visibility",
     ),
+    ("kept_mesh", "backend bake error gather mesh path_correction scene vertex visibility"),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 

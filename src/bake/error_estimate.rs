@@ -72,6 +72,18 @@ impl ErrorEstimate {
     pub fn of_light(&self) -> f64 {
         self.truncation.hypot(self.unshot).hypot(self.sources)
     }
+
+    /// That of `samples` points alone: by the rays that gathered there and by the paths, so many,
+    /// that corrected what they gathered from.
+    pub(crate) fn at_points(
+        samples: usize,
+        sampling: f64,
+        sources: f64,
+        paths: usize,
+    ) -> ErrorEstimate {
+        let total = sampling.hypot(sources);
+        ErrorEstimate { total, sampling, sources, samples, paths, ..ErrorEstimate::default() }
+    }
 }
 
 /// The estimated error of one group of the scene.

@@ -43,7 +43,7 @@ pub enum Obstacle {
 
 impl Obstacle {
     /// What most of `estimate` is from, after all rounds.
-    pub(super) fn largest_part(estimate: &ErrorEstimate) -> Obstacle {
+    pub(crate) fn largest_part(estimate: &ErrorEstimate) -> Obstacle {
         let ErrorEstimate { mesh, sampling, truncation, unshot, sources, .. } = *estimate;
         let parts = [
             (mesh, Obstacle::Edges),

@@ -95,13 +95,28 @@ impl<'a> VertexGatherPoints<'a> {
 
     /// The gather point of vertex `v` at its `attempt`: in another element around it each time.
     pub fn point(&self, v: u32, attempt: usize) -> TwoSidedPoint {
+        self.point_beside(v, 0.02 * self.to_centroid(v, attempt))
+    }
+
+    /// The same as near to the vertex as where light is the same, ten times as far from what else
+    /// meets there as from the surface: for elements that are large beside changes of light.
+    pub fn nearest_point(&self, v: u32, attempt: usize) -> TwoSidedPoint {
+        let (inward, least) = (self.to_centroid(v, attempt), 10.0 * self.offset.min_offset);
+        let inset = (10.0 * offset::SURFACE_LIFT * self.size(v)).max(least);
+        self.point_beside(v, inward.clamp_length_max(inset))
+    }
+
+    /// From vertex `v` to the centroid of the element of `attempt`.
+    fn to_centroid(&self, v: u32, attempt: usize) -> DVec3 {
         let around = self.around(v);
         let step = around.len().div_ceil(MAX_ATTEMPTS);
         let element = self.mesh.element(around[attempt * step % around.len()] as usize);
-        let position = self.position(v);
-        let inset = (self.mesh.centroid(element) - position) * 0.02;
+        self.mesh.centroid(element) - self.position(v)
+    }
+
+    fn point_beside(&self, v: u32, inset: DVec3) -> TwoSidedPoint {
         let (normal, size) = (self.normal(v), self.size(v));
-        let point = self.offset.gather_point(position + inset, normal, size);
+        let point = self.offset.gather_point(self.position(v) + inset, normal, size);
         TwoSidedPoint::new(point, self.material(v))
     }
 

@@ -8,7 +8,7 @@ use super::{cannot_write, write_file};
 use crate::camera::RadianceImage;
 use crate::error::{Error, ErrorKind};
 #[cfg(feature = "light-map")]
-use crate::light_map::LightMap;
+use crate::light_map::MapPage;
 use crate::scene::Rgb;
 
 /// Writes linear radiance, W/(m² sr), as a 32-bit float OpenEXR with channels R, G, B.
@@ -22,33 +22,42 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
     write(path.as_ref(), size, channels.into())
 }
 
-/// Writes the irradiance of a light map, W/m², as a 32-bit float OpenEXR. Its channels are R, G, B,
-/// `coverage`, 1 where a texel gathered and 0 where it is empty or filled from its neighbours, and
-/// `error`, the standard error of a texel that gathered, W/m², a length over R, G and B.
-/// At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
+/// Writes the irradiance of a light map or a page of it, W/m², as a 32-bit float OpenEXR. Its
+/// channels are R, G, B, `coverage`, 1 where a texel gathered and 0 where it is empty or filled from
+/// its neighbours, and `error`, the standard error of a texel that gathered, W/m², a length over R,
+/// G and B. At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
 ///
 /// # Errors
 /// Those of [`write_exr`].
 #[cfg(feature = "light-map")]
-pub fn write_light_map_exr(path: impl AsRef<Path>, map: &LightMap) -> Result<(), Error> {
-    let size = [map.atlas.width(), map.atlas.height()];
-    let [r, g, b] = rgb(path.as_ref(), size, &map.irradiance, ["irradiance", "W/m²"])?;
-    let coverage = map.gathered.iter().map(|&gathered| f32::from(u8::from(gathered))).collect();
-    let error = map.standard_error.iter().map(|&error| error as f32).collect();
-    write(path.as_ref(), size, vec![r, g, b, ("coverage", coverage), ("error", error)])
+pub fn write_light_map_exr<'a>(
+    path: impl AsRef<Path>,
+    map: impl Into<MapPage<'a>>,
+) -> Result<(), Error> {
+    let page = map.into();
+    let (map, path) = (page.map, path.as_ref());
+    let [r, g, b] = rgb(path, page.size(), &page.of(&map.irradiance), ["irradiance", "W/m²"])?;
+    let gathered = page.of(&map.gathered);
+    let coverage = gathered.into_iter().map(|gathered| f32::from(u8::from(gathered))).collect();
+    let error = page.of(&map.standard_error).into_iter().map(|error| error as f32).collect();
+    write(path, page.size(), vec![r, g, b, ("coverage", coverage), ("error", error)])
 }
 
-/// Writes the radiosity of a light map, W/m², as a 32-bit float OpenEXR with channels R, G, B:
-/// emitted and reflected, by materials without their textures
-/// ([`LightMap::radiosity`]).
+/// Writes the radiosity of a light map or a page of it, W/m², as a 32-bit float OpenEXR with
+/// channels R, G, B: emitted and reflected, by materials without their textures
+/// ([`LightMap::radiosity`](crate::light_map::LightMap::radiosity)).
 ///
 /// # Errors
 /// Those of [`write_exr`].
 #[cfg(feature = "light-map")]
-pub fn write_light_map_radiosity(path: impl AsRef<Path>, map: &LightMap) -> Result<(), Error> {
-    let size = [map.atlas.width(), map.atlas.height()];
-    let channels = rgb(path.as_ref(), size, &map.radiosity(), ["radiosity", "W/m²"])?;
-    write(path.as_ref(), size, channels.into())
+pub fn write_light_map_radiosity<'a>(
+    path: impl AsRef<Path>,
+    map: impl Into<MapPage<'a>>,
+) -> Result<(), Error> {
+    let page = map.into();
+    let radiosity = page.of(&page.map.radiosity());
+    let channels = rgb(path.as_ref(), page.size(), &radiosity, ["radiosity", "W/m²"])?;
+    write(path.as_ref(), page.size(), channels.into())
 }
 
 /// Name and samples of a channel, row by row from the top.

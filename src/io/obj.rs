@@ -150,7 +150,7 @@ impl<'a> ObjFile<'a> {
 
     /// The error that there is no face, with counts of the content.
     fn without_faces(&self) -> Error {
-        let mut found = format!("no face, {} vertices", self.statements.vertices);
+        let mut found = format!("no face, {} vertices", self.statements.positions.len());
         for kind in [
             WarningKind::FewCorners,
             WarningKind::PointsAndLines,

@@ -6,8 +6,7 @@ use super::gathered::{LightMap, check_scene};
 use super::texel_points::TexelPoints;
 use crate::bake::BakeResult;
 use crate::error::Error;
-use crate::path_correction::{Goal, MissingLight, PathOrigin, missed_light, scales};
-use crate::scene::Rgb;
+use crate::path_correction::{GatheredPoint, SurfaceGoal, correct_surface};
 
 /// Edge of the finest cells over which texels share paths, in texels.
 const TEXELS_OF_CELL: f64 = 4.0;
@@ -35,41 +34,31 @@ impl LightMap {
         check_scene(&self.atlas, &baked.light)?;
         let texels: Vec<u32> =
             (0..self.gathered.len() as u32).filter(|&k| self.gathered[k as usize]).collect();
-        let sizes = texels.iter().map(|&texel| self.irradiance[texel as usize].length());
-        let scales = scales(sizes, baked.settings.measure.floor);
         let points = TexelPoints::new(&self.atlas);
-        let scene = self.atlas.scene();
-        let (origin, diagonal) = (scene.bounds().low, scene.bounds().diagonal());
-        let triangle = |texel: u32| self.triangles[texel as usize] as usize;
-        let origin_of = |(&texel, &scale): (&u32, &f64)| {
-            let point = points.point(texel, triangle(texel)).point;
-            PathOrigin {
-                position: (point.position - origin) / diagonal,
-                normal: point.normal,
-                scale,
-                area: points.texel_size(triangle(texel)).powi(2),
+        let point = |k: usize| {
+            let texel = texels[k];
+            let triangle = self.triangles[texel as usize] as usize;
+            GatheredPoint {
+                point: points.point(texel, triangle),
+                area: points.texel_size(triangle).powi(2),
+                irradiance: self.irradiance[texel as usize],
+                near_paths: self.near_paths[texel as usize],
             }
         };
-        let origins: Vec<PathOrigin> = texels.iter().zip(&scales).map(origin_of).collect();
-        let missing = MissingLight::new(&baked.light);
-        let sample = |k: usize, path: usize| {
-            let texel = texels[k];
-            let point = points.point(texel, triangle(texel));
-            let near_paths = self.near_paths[texel as usize];
-            missing.irradiance_two_sided(&point, near_paths, path).to_array()
+        let goal = SurfaceGoal {
+            error,
+            expected: [baked.estimate.of_light(), baked.estimate.total],
+            floor: baked.settings.measure.floor,
+            finest: TEXELS_OF_CELL * self.atlas.texel_size(),
         };
-        let finest = TEXELS_OF_CELL * self.atlas.texel_size() / diagonal;
-        let (expected, goal) =
-            ([baked.estimate.of_light(), baked.estimate.total], Goal::Mean(error));
-        let Some(found) = missed_light(&origins, finest, expected, &goal, sample, progress) else {
+        let Some(found) = correct_surface(&baked.light, texels.len(), point, &goal, progress)
+        else {
             return Ok(None);
         };
         for (k, &texel) in texels.iter().enumerate() {
             let texel = texel as usize;
-            let corrected = self.irradiance[texel] + scales[k] * Rgb::from_array(found.missed[k]);
-            self.irradiance[texel] = corrected.max(Rgb::ZERO);
-            let of_light = scales[k] * found.variance[k].sqrt();
-            self.standard_error[texel] = self.standard_error[texel].hypot(of_light);
+            self.irradiance[texel] = found.irradiance[k];
+            self.standard_error[texel] = self.standard_error[texel].hypot(found.standard_error[k]);
         }
         self.finish();
         Ok(Some(found.error))

@@ -129,7 +129,7 @@ impl LightMap {
         let mut known = gathered.clone();
         fill_from_neighbours(irradiance, &mut known, atlas.size, buried, usize::MAX);
         seams::weld(atlas, irradiance);
-        dilate(irradiance, triangles, atlas.size);
+        dilate(irradiance, triangles, atlas);
     }
 
     /// Radiosity of each texel, W/m² per channel: exitance and reflected light of its material,
@@ -145,14 +145,19 @@ impl LightMap {
         };
         let mut radiosity: Vec<Rgb> =
             self.triangles.iter().zip(&self.irradiance).map(of_texel).collect();
-        dilate(&mut radiosity, &self.triangles, self.atlas.size);
+        dilate(&mut radiosity, &self.triangles, &self.atlas);
         radiosity
     }
 
     /// Fraction of all texels that triangles cover, in [0, 1].
     pub fn coverage(&self) -> f64 {
-        let covered = self.triangles.iter().filter(|&&t| t != NO_TRIANGLE).count();
+        let covered = self.covered().iter().filter(|&&covered| covered).count();
         covered as f64 / self.triangles.len() as f64
+    }
+
+    /// Whether triangles cover each texel.
+    pub(super) fn covered(&self) -> Vec<bool> {
+        self.triangles.iter().map(|&t| t != NO_TRIANGLE).collect()
     }
 }
 
@@ -172,11 +177,11 @@ pub(super) fn gatherer<'a>(
 }
 
 /// Fills empty texels next to charts from their neighbours.
-fn dilate(values: &mut [Rgb], triangles: &[u32], size: [u32; 2]) {
+fn dilate(values: &mut [Rgb], triangles: &[u32], atlas: &Atlas) {
     let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
     let empty = (0..known.len() as u32).filter(|&k| !known[k as usize]).collect();
-    // Filters of renderers reach over two texels.
-    fill_from_neighbours(values, &mut known, size, empty, 2);
+    let rings = atlas.filled_texels() as usize;
+    fill_from_neighbours(values, &mut known, atlas.size, empty, rings);
 }
 
 /// Checks that `light` is that of the scene of `atlas`, whose triangles a bake may have cut.

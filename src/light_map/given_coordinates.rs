@@ -23,19 +23,20 @@ pub enum Unusable {
     Overlapping([usize; 2]),
 }
 
-/// Layout of the triangles of `scene` by the coordinates of its file, unless these are unusable.
+/// Layout of `triangles` of `scene` in one map by the coordinates of its file, unless these are
+/// unusable.
 ///
 /// # Errors
 /// [`ErrorKind::Setting`](crate::ErrorKind::Setting) for more than [`MAX_SIDE`] texels.
 pub(super) fn layout(
     scene: &Scene,
+    triangles: &[u32],
     resolution: Resolution,
 ) -> Result<Result<Layout, Unusable>, Error> {
-    let triangles = 0..scene.triangles().len();
     let downwards = |corners: [DVec2; 3]| corners.map(|p| DVec2::new(p.x, 1.0 - p.y));
-    let none = [DVec2::NAN; 3];
-    let coordinates: Vec<[DVec2; 3]> =
-        triangles.map(|t| downwards(scene.texture_coordinates(t).unwrap_or(none))).collect();
+    let of_file =
+        |&t: &u32| downwards(scene.texture_coordinates(t as usize).unwrap_or([DVec2::NAN; 3]));
+    let coordinates: Vec<[DVec2; 3]> = triangles.iter().map(of_file).collect();
     let count = |is: fn(&[DVec2; 3]) -> bool| coordinates.iter().filter(|c| is(c)).count();
     for (count, unusable) in [
         (count(|c| !c.iter().all(|p| p.is_finite())), Unusable::Missing as fn(usize) -> Unusable),
@@ -49,7 +50,7 @@ pub(super) fn layout(
     let side = match resolution {
         Resolution::Pixels(side) => side,
         Resolution::TexelSize(size) => {
-            let on_surfaces: f64 = (0..coordinates.len()).map(|t| scene.area(t)).sum();
+            let on_surfaces: f64 = triangles.iter().map(|&t| scene.area(t as usize)).sum();
             let side = (on_surfaces / coordinates.iter().map(area).sum::<f64>()).sqrt() / size;
             if side > f64::from(MAX_SIDE) {
                 return Err(bad_size(resolution, format!("{} along a side", side.ceil())));
@@ -59,8 +60,11 @@ pub(super) fn layout(
     };
     let size = [side; 2];
     Ok(match overlapping(&coordinates, size) {
-        Some(pair) => Err(Unusable::Overlapping(pair)),
-        None => Ok(Layout { size, coordinates, charts: None }),
+        Some(pair) => Err(Unusable::Overlapping(pair.map(|k| triangles[k] as usize))),
+        None => {
+            let maps = vec![0; coordinates.len()];
+            Ok(Layout { sizes: vec![size], maps, coordinates, charts: None })
+        }
     })
 }
 

@@ -1,8 +1,57 @@
-//! Size of a light map, and coordinates of triangles in it.
+//! Sizes of light maps, and coordinates of triangles in them.
 
 use glam::DVec2;
 
+use super::atlas::Coordinates;
+use super::pages::Maps;
 use crate::error::{Error, ErrorKind};
+
+/// How the surfaces of a scene are laid out in light maps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LayoutSettings {
+    /// Size of the texels.
+    pub resolution: Resolution,
+    /// Source of the texture coordinates.
+    pub coordinates: Coordinates,
+    /// What has a map of its own.
+    pub maps: Maps,
+    /// Texels between a chart and the border of its map, and half of those between charts, 3 or
+    /// more: one that points on the outline use, the others filled from it. Filters of the map
+    /// itself need two of these; of smaller images, each half as large as the one before (mipmaps),
+    /// n need 2ⁿ. Coordinates of a file have what they have.
+    pub padding: u32,
+}
+
+impl LayoutSettings {
+    /// One map for all, by the coordinates of the file where they are usable, with a padding of 3.
+    pub fn new(resolution: Resolution) -> LayoutSettings {
+        let (coordinates, maps) = (Coordinates::Auto, Maps::One);
+        LayoutSettings { resolution, coordinates, maps, padding: 3 }
+    }
+
+    pub(super) fn check(&self) -> Result<(), Error> {
+        self.resolution.check()?;
+        let bad = |place: String, found: &str, remedy: &str| {
+            Err(Error::new(ErrorKind::Setting, place, found, remedy))
+        };
+        if !(3..=MAX_SIDE / 4).contains(&self.padding) {
+            let place = format!("padding of {} texels", self.padding);
+            return bad(place, "out of range", "use 3, or 2^n for n smaller images");
+        }
+        match (self.maps, self.resolution) {
+            (Maps::Pages(side), _) if side == 0 || side > MAX_SIDE => {
+                Err(bad_size(Resolution::Pixels(side), "out of range".into()))
+            }
+            (Maps::Pages(side), Resolution::Pixels(_)) => bad(
+                format!("pages of {side} texels along a side"),
+                "no size of texels",
+                "give the size of a texel on the surfaces, by which pages are as many as needed",
+            ),
+            _ => Ok(()),
+        }
+    }
+}
 
 /// Size of the texels of a light map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,11 +63,14 @@ pub enum Resolution {
     Pixels(u32),
 }
 
-/// Coordinates of triangles in a map, independent of the scene.
+/// Coordinates of triangles in maps, independent of the scene.
 pub(super) struct Layout {
-    /// Texels in a row, and rows.
-    pub size: [u32; 2],
-    /// Of the corners of each triangle, as in [`Atlas::coordinates`](super::Atlas::coordinates).
+    /// Of each map the texels in a row, and the rows.
+    pub sizes: Vec<[u32; 2]>,
+    /// The map of each triangle.
+    pub maps: Vec<u32>,
+    /// Of the corners of each triangle in its map, as in
+    /// [`Atlas::coordinates`](super::Atlas::coordinates).
     pub coordinates: Vec<[DVec2; 3]>,
     /// Number of charts laid out; none if the coordinates are those of the file.
     pub charts: Option<usize>,

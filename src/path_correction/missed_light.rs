@@ -57,10 +57,6 @@ pub(crate) struct PathOrigin {
 #[derive(Clone, Debug)]
 pub(crate) enum Goal {
     /// The root mean square over area of standard errors is at most this.
-    #[cfg_attr(
-        not(feature = "light-map"),
-        allow(dead_code, reason = "only light maps ask for a mean")
-    )]
     Mean(f64),
     /// The variance at each point, a sum over the numbers, is at most this. Where that is not above
     /// 0 paths do not help.

@@ -3,6 +3,7 @@ mod contacts;
 pub mod cornell_box;
 #[cfg(feature = "textures")]
 mod cut_outs;
+mod kept_mesh;
 mod luminaires;
 mod outcome;
 mod previews;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{lit_plates, run, texts};
+use crate::{lit_plates, refused, run, texts, write};
 
 /// Runs a quick `command` on the scene of two plates in `folder`, with this `--out`; gives the
 /// files that it says it wrote.
@@ -52,4 +52,38 @@ fn files_go_into_a_folder_or_by_a_stem_and_are_named() {
     let out = run("bake", &[&place("lit.obj"), "--cpu", "--out", &missing]);
     let error = &texts(&out)[1];
     assert!(!out.status.success() && error.contains("choose a folder that exists"), "{error}");
+}
+
+#[test]
+fn a_kept_mesh_has_the_vertices_of_the_file_in_their_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 0 -1\nv 0 1 0\nf 2 3 4\nf 2 5 3\n";
+    let scene = write(folder.path(), "corner.obj", text);
+    let stem = folder.path().join("lit");
+    let out = run(
+        "bake",
+        &[
+            scene.to_str().unwrap(),
+            "--keep-mesh",
+            "--cpu",
+            "--error",
+            "0.2",
+            "--write",
+            "ply,json",
+            "--out",
+            stem.to_str().unwrap(),
+        ],
+    );
+    let [said, told] = texts(&out);
+    assert!(out.status.success(), "{said}{told}");
+    assert!(told.contains("2 vertices are shared by surfaces that meet in a crease"), "{told}");
+    let ply = radiosity::read_ply(folder.path().join("lit.ply")).unwrap();
+    let positions: Vec<[f64; 3]> = ply.positions.iter().map(|p| p.to_array()).collect();
+    let of_file = [[9., 9., 9.], [0., 0., 0.], [1., 0., 0.], [0., 0., -1.], [0., 1., 0.]];
+    assert_eq!(positions, of_file);
+    let report = std::fs::read_to_string(folder.path().join("lit.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    // Both sides of either triangle are lit; the file has the front of each.
+    assert_eq!((report["elements"].as_u64(), ply.faces.len()), (Some(4), 2));
+    refused(&["x.obj", "--keep-mesh", "--time", "3"], &["cannot be used with"]);
 }

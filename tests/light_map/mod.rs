@@ -2,6 +2,7 @@ mod atlas;
 mod correction;
 mod files;
 mod light;
+mod pages;
 mod shown_error;
 #[cfg(feature = "textures")]
 mod textured_glb;

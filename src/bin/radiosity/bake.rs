@@ -6,12 +6,13 @@ pub mod settings;
 
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use files::Files;
 use radiosity::bake::Outcome;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, kept_mesh};
 use settings::Adjustment;
 
 use crate::args::{self, DeviceOptions, MeasureOptions, Parsed, SHARE, Stop, give, value};
@@ -29,7 +30,7 @@ the tail. \
 Ctrl-C or SIGTERM stops the bake and writes what there is; a second one ends the program at \
 once.")]
 pub struct Bake {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj", required = true)]
     scene: Option<PathBuf>,
     /// Bake until the estimated error of reflected radiosity is below this share [default: 0.05]
@@ -48,6 +49,10 @@ pub struct Bake {
     /// not linear on them; all, of elements that are all split once
     #[arg(long, value_name = "WHICH", hide_possible_values = true)]
     gather: Option<Gather>,
+    /// Light at the file's own vertices, in their order, and nothing split: the error is that of the
+    /// vertices alone
+    #[arg(long, conflicts_with_all = ["error_each", "time", "gather", "bands", "pixel_gather"])]
+    keep_mesh: bool,
     /// Set a setting of the library, as rays=512; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = settings::adjustment)]
     set: Vec<Adjustment>,
@@ -114,7 +119,7 @@ impl Bake {
             (None, Some(error), _) => Target::ErrorEach(error),
             (None, None, Some(time)) => Target::Seconds(time.as_secs_f64()),
             (None, None, None) => match self.gather {
-                None if self.set.is_empty() => Target::Error(0.05),
+                None if self.set.is_empty() || self.keep_mesh => Target::Error(0.05),
                 gather => Target::Settings(gather.unwrap_or(Gather::None)),
             },
         }
@@ -141,19 +146,24 @@ impl Bake {
     }
 
     /// From the scene file to all files that are asked for.
-    fn bake_file(mut self, path: &Path) -> Result<Report, Error> {
+    fn bake_file(mut self, path: &Path) -> Result<Report, Stop> {
         let start = Instant::now();
-        self.files.name_after(path, &self.reading)?;
+        self.files.name_after(path, &self.reading, self.keep_mesh)?;
         let Input { scene, luminaires, mut warnings, .. } = self.reading.read(path)?;
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;
+        // Once for the bake and the vertices.
+        let scene = Arc::new(if self.keep_mesh { scene.resolve_sides() } else { scene });
         let triangles = scene.triangles().len();
         let opening = Instant::now();
         let device = self.device.open()?;
         let baking = Instant::now();
         let mut baked = progress::of_bake(|unshot_goal, report| {
-            self.bake(scene, &device, start, unshot_goal, report)
+            self.bake(scene.clone(), &device, start, unshot_goal, report)
         })?;
+        if self.keep_mesh {
+            baked = self.on_kept_mesh(&baked, scene, &device)?;
+        }
         let band_light = bands::light(bands.as_ref(), &baked)?;
         let stopped = interrupt::stopped();
         warnings.extend(warn_of_failure(&baked));
@@ -190,11 +200,25 @@ impl Bake {
         Ok(report)
     }
 
+    /// The light of a bake at the vertices of `scene`.
+    fn on_kept_mesh(
+        &self,
+        baked: &BakeResult,
+        scene: Arc<Scene>,
+        device: &Backend,
+    ) -> Result<BakeResult, Stop> {
+        let error = self.error.unwrap_or(0.05);
+        let kept = progress::of_stoppable("vertices, then paths", |report| {
+            baked.on_kept_mesh(scene, error, device, report)
+        })?;
+        kept.ok_or(Stop::Interrupted)
+    }
+
     /// The bake itself, of a program that began at `start`; `unshot_goal` is set to the share of
     /// unshot light that it goes down to.
     fn bake(
         &self,
-        scene: Scene,
+        scene: Arc<Scene>,
         device: &Backend,
         start: Instant,
         unshot_goal: &Cell<f64>,
@@ -208,6 +232,9 @@ impl Bake {
         let left =
             |time: Duration| time.saturating_sub(start.elapsed()).max(Duration::from_millis(1));
         let target = match (self.target(), self.limit().map(left)) {
+            (Target::Error(error), None) if self.keep_mesh => {
+                BakeTarget::Error(kept_mesh::error_of_bake(error))
+            }
             (Target::Error(error), None) => BakeTarget::Error(error),
             (Target::Error(error), Some(time)) => {
                 BakeTarget::Within { error, each_group: false, time }

@@ -45,6 +45,12 @@ impl CameraOption {
             Some(Given::Name(name)) => self.of_file(scene, Some(name))?,
             None => self.of_file(scene, None)?,
         };
+        if self.camera.is_none()
+            && let Some(Err(e)) = self.known.map(|camera| camera.check(1, 1, 1))
+        {
+            eprintln!("warning: the first camera of the file is passed over: {e}");
+            self.known = None;
+        }
         // The one that will be chosen is good; sizes are checked with any.
         let (eye, target, up) = (DVec3::ZERO, DVec3::Z, DVec3::Y);
         let any = Camera { eye, target, up, vertical_fov: 90.0 };

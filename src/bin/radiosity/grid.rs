@@ -31,7 +31,7 @@ STEM.grid-1.png and so on; prints mean, minimum, maximum and uniformity (minimum
 inside solids are marked and do not count. Lengths are in metres. With --weather the table has a \
 year of daylight: docs/daylight.md.")]
 pub struct Options {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
     /// Measure above this group: its highest side that faces up or, if none does, before the side

@@ -1,5 +1,6 @@
 //! `radiosity light-map`: the irradiance of a scene's surfaces in a texture.
 
+use std::collections::HashSet;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,12 +8,15 @@ use std::time::Instant;
 
 use clap::Args;
 use radiosity::io::{
-    ToneCurve, write_light_map_exr, write_light_map_glb, write_light_map_radiosity,
-    write_ply_with_tone, write_png_with_tone,
+    ToneCurve, rgbm_range, write_light_map_exr, write_light_map_glb, write_light_map_ktx2,
+    write_light_map_radiosity, write_light_map_rgbm, write_ply_with_tone, write_png_with_tone,
 };
-use radiosity::light_map::{Atlas, Coordinates, LightMap, Resolution};
+use radiosity::light_map::{
+    Atlas, Coordinates, LayoutSettings, LightMap, MapPage, Maps, Page, Resolution,
+};
 use radiosity::verify::Estimate;
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene, Sky};
+use serde_json::{Value, json};
 
 use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
@@ -30,6 +34,9 @@ const PIXELS: RangeInclusive<u32> = 64..=2048;
 /// squares add up. Plain choice: as many texels again would leave more than paths cost.
 const BETWEEN_TEXELS: f64 = 0.8;
 
+/// Bytes of memory for a texel of a map: irradiance, error, triangle and whether it gathered.
+const BYTES_OF_TEXEL: f64 = 24.0 + 8.0 + 4.0 + 2.0;
+
 /// Pixels of the picture.
 const PICTURE: [u32; 2] = [768, 512];
 
@@ -40,10 +47,20 @@ enum Format {
     Glb,
     Ply,
     Png,
+    Rgbm,
+    Ktx2,
+    Json,
 }
 
-const FORMATS: Names<Format> =
-    &[("exr", Format::Exr), ("glb", Format::Glb), ("ply", Format::Ply), ("png", Format::Png)];
+const FORMATS: Names<Format> = &[
+    ("exr", Format::Exr),
+    ("glb", Format::Glb),
+    ("ply", Format::Ply),
+    ("png", Format::Png),
+    ("rgbm", Format::Rgbm),
+    ("ktx2", Format::Ktx2),
+    ("json", Format::Json),
+];
 
 const COORDINATES: Names<Coordinates> =
     &[("auto", Coordinates::Auto), ("file", Coordinates::Given), ("new", Coordinates::Unwrapped)];
@@ -57,8 +74,8 @@ both sides have texels for each; --sides front makes them one-sided. Ctrl-C stop
 which then writes a map of fewer texels where one is done. STEM is the scene's path with \
 .light-map as its ending unless --out gives another.")]
 pub struct Options {
-    /// Scene, an OBJ file
-    #[arg(value_name = "SCENE.obj")]
+    /// Scene: OBJ, glTF or STL
+    #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Error of the bake, and of the map between texels, as a share [default: 0.05]
     #[arg(long, value_name = "SHARE", value_parser = value::<f64>(SHARE))]
@@ -69,13 +86,33 @@ pub struct Options {
     #[arg(overrides_with = "error")]
     error_each: Option<f64>,
     /// Texels along a side of the map [default: a power of two, 64 to 2048, that suits the error]
-    #[arg(long, value_name = "PIXELS", overrides_with = "texel")]
+    #[arg(long, value_name = "PIXELS", group = "resolution")]
     #[arg(value_parser = value::<u32>("a whole number of pixels"))]
     size: Option<u32>,
     /// Edge of a texel on the surfaces, scene unit
-    #[arg(long, value_name = "SIZE", overrides_with = "size")]
+    #[arg(long, value_name = "SIZE", group = "resolution")]
     #[arg(value_parser = value::<f64>("a length"))]
     texel: Option<f64>,
+    /// Texels a metre
+    #[arg(long, value_name = "TEXELS", group = "resolution")]
+    #[arg(value_parser = value::<f64>("a number of texels"))]
+    density: Option<f64>,
+    /// Spread surfaces over maps of so many texels along a side, as many as needed: STEM.1.exr …;
+    /// with --texel or --density
+    #[arg(long, value_name = "PIXELS", requires = "resolution", conflicts_with = "size")]
+    #[arg(value_parser = value::<u32>("a whole number of pixels"))]
+    atlas: Option<u32>,
+    /// A map for each group, with coordinates of its own: STEM.GROUP.exr …; with --size, --texel or
+    /// --density
+    #[arg(long, requires = "resolution", conflicts_with = "atlas")]
+    each_group: bool,
+    /// Texels between charts and the borders of maps, filled from the charts: 2^n for n smaller
+    /// images (mipmaps)
+    #[arg(long, value_name = "TEXELS", default_value_t = 3)]
+    padding: u32,
+    /// Print the size of maps, and what they take, and end before the bake
+    #[arg(long)]
+    dry_run: bool,
     /// Texture coordinates: file, those of the file, in [0, 1] and with no texel in two triangles;
     /// new, charts for all smooth surfaces; auto, those of the file where they can be used
     #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = one_of(COORDINATES))]
@@ -85,7 +122,8 @@ pub struct Options {
     radiosity: bool,
     #[command(flatten)]
     output: Output,
-    /// Files: exr; glb; ply, the scene cut to pieces of two texels with the light of the map, for
+    /// Files: exr; glb; ktx2, with a common exponent (E5B9G9R9); rgbm, STEM.rgbm.png; json, what the
+    /// maps are; ply, the scene cut to pieces of two texels with the light of the map, for
     /// `radiosity verify`; png, a picture of that
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "exr,glb")]
@@ -147,6 +185,47 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
     );
 }
 
+/// What files of each page of `atlas` have before their endings: nothing for the only one, its
+/// group's name in characters that all systems have in names of files, or its number.
+fn page_names(atlas: &Atlas) -> Vec<String> {
+    let groups = atlas.scene().groups();
+    let mut known = HashSet::new();
+    let name = |(k, page): (usize, &Page)| {
+        let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+        let number = (k + 1).to_string();
+        let name = match page.group {
+            Some(group) => groups[group as usize].chars().map(plain).collect(),
+            None if atlas.pages().len() == 1 => return String::new(),
+            None => number.clone(),
+        };
+        // Systems may take upper and lower case for the same.
+        let is_new = known.insert(name.to_lowercase());
+        if is_new { format!("{name}.") } else { format!("{name}-{number}.") }
+    };
+    atlas.pages().iter().enumerate().map(name).collect()
+}
+
+/// Prints the maps of `atlas` and what they will take.
+fn print_layout(atlas: &Atlas) {
+    let texels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+    let megabytes = |bytes: f64| bytes / f64::from(1 << 20);
+    say!("map                              texels     exr, ktx2, rgbm at most, MiB");
+    for (name, page) in page_names(atlas).iter().zip(atlas.pages()) {
+        let [width, height] = page.size;
+        let name = if name.is_empty() { "all" } else { name.trim_end_matches('.') };
+        let [exr, packed] = [20.0, 4.0].map(|bytes| megabytes(bytes * texels(page.size)));
+        let size = format!("{width} × {height}");
+        say!("{name:<30} {size:>12} {exr:>9.2} {packed:>9.2} {packed:>9.2}");
+    }
+    let all: f64 = atlas.pages().iter().map(|page| texels(page.size)).sum();
+    let memory = megabytes(BYTES_OF_TEXEL * texels([atlas.width(), atlas.height()]));
+    say!(
+        "{} maps, {all} texels of about {:.4}; {memory:.0} MiB of memory for them",
+        atlas.pages().len(),
+        atlas.texel_size()
+    );
+}
+
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
@@ -160,6 +239,10 @@ impl Options {
         let load = start.elapsed().as_secs_f64();
         let atlas = self.first_atlas(scene)?;
         let layout = start.elapsed().as_secs_f64();
+        if self.dry_run {
+            print_layout(&atlas);
+            return Ok(());
+        }
         let device = self.device.open()?;
         let open = start.elapsed().as_secs_f64();
         let mut baked = progress::of_bake(|_, report| {
@@ -173,7 +256,7 @@ impl Options {
             // As in the picture of a bake.
             baked.light.surface.sky = Sky::default();
         }
-        self.write(&map, &baked)?;
+        self.write(&map, &baked, shown.as_ref())?;
         print_map(&map, &baked);
         let total = start.elapsed().as_secs_f64();
         say!(
@@ -206,7 +289,9 @@ impl Options {
     /// The number of texels; none for as many as the error takes.
     fn resolution(&self) -> Option<Resolution> {
         let size = self.size.map(Resolution::Pixels);
-        size.or(self.texel.map(Resolution::TexelSize))
+        let of_metre = |texels: f64| 1.0 / (self.reading.unit * texels);
+        let texel = self.texel.or(self.density.map(of_metre));
+        size.or(texel.map(Resolution::TexelSize))
     }
 
     /// Lays out the surfaces of `scene`: in the fewest texels that they have room in, unless their
@@ -234,7 +319,14 @@ impl Options {
     }
 
     fn atlas(&self, scene: Arc<Scene>, resolution: Resolution) -> Result<Atlas, Error> {
-        Atlas::new(scene, resolution, self.coordinates)
+        let mut settings = LayoutSettings::new(resolution);
+        (settings.coordinates, settings.padding) = (self.coordinates, self.padding);
+        settings.maps = match self.atlas {
+            Some(side) => Maps::Pages(side),
+            None if self.each_group => Maps::EachGroup,
+            None => Maps::One,
+        };
+        Atlas::with_settings(scene, &settings)
     }
 
     /// The map of `baked`, corrected by paths, and how far off it is; with as many texels as that
@@ -247,9 +339,10 @@ impl Options {
     ) -> Result<(LightMap, Option<Shown>), Stop> {
         let (mut map, between) = self.resolved_map(atlas, baked, device)?;
         let Some(between) = between else { return Ok((map, None)) };
-        // A quarter of it where texels leave less, since paths cost by the square.
+        // A quarter of the error, or of what is lost between texels if that is more: it adds 3 % to
+        // the whole, and paths cost by the square.
         let left = (self.error().powi(2) - between.value.powi(2)).max(0.0).sqrt();
-        let left = left.max(0.25 * self.error());
+        let left = left.max(0.25 * self.error().max(between.value));
         let of_light = match args::end() {
             Ok(()) => progress::of_stoppable("paths", |report| map.correct(baked, left, report))?,
             Err(_) => None,
@@ -331,15 +424,37 @@ impl Options {
         is_reached
     }
 
-    fn write(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {
+    fn write(
+        &self,
+        map: &LightMap,
+        baked: &BakeResult,
+        shown: Option<&Shown>,
+    ) -> Result<(), Error> {
         let writes = |format: Format| self.formats.contains(&format);
         let path = |ending: &str| self.output.path(ending);
-        if writes(Format::Exr) {
-            progress::of_writing(&path("exr"), |path| write_light_map_exr(path, map))?;
+        let range = rgbm_range(map);
+        for (k, name) in page_names(&map.atlas).iter().enumerate() {
+            let (page, path) = (map.page(k), |ending: &str| path(&format!("{name}{ending}")));
+            let write = |ending: &str, write: &dyn Fn(&Path, MapPage) -> Result<(), Error>| {
+                progress::of_writing(&path(ending), |path| write(path, page))
+            };
+            if writes(Format::Exr) {
+                write("exr", &|path, page| write_light_map_exr(path, page))?;
+            }
+            if self.radiosity {
+                write("radiosity.exr", &|path, page| write_light_map_radiosity(path, page))?;
+            }
+            if writes(Format::Ktx2) {
+                write("ktx2", &|path, page| write_light_map_ktx2(path, page))?;
+            }
+            if writes(Format::Rgbm) {
+                write("rgbm.png", &|path, page| write_light_map_rgbm(path, page, range))?;
+            }
         }
-        if self.radiosity {
-            let write = |path: &Path| write_light_map_radiosity(path, map);
-            progress::of_writing(&path("radiosity.exr"), write)?;
+        // The range of RGBM is in the report.
+        if writes(Format::Json) || writes(Format::Rgbm) {
+            let report = self.report(map, baked, shown);
+            self.output.write("json", format!("{report:#}\n").as_bytes())?;
         }
         if !writes(Format::Glb) && !writes(Format::Ply) && !writes(Format::Png) {
             return Ok(());
@@ -365,6 +480,31 @@ impl Options {
             progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
         }
         Ok(())
+    }
+
+    /// What the maps are, for programs that use them.
+    fn report(&self, map: &LightMap, baked: &BakeResult, shown: Option<&Shown>) -> Value {
+        let atlas = &map.atlas;
+        let groups = atlas.scene().groups();
+        let pages = page_names(atlas).into_iter().zip(atlas.pages()).map(|(name, page)| {
+            let group = page.group.map(|group| &groups[group as usize]);
+            json!({ "name": name.trim_end_matches('.'), "group": group, "size": page.size })
+        });
+        json!({
+            "maps": pages.collect::<Vec<_>>(),
+            "texel": atlas.texel_size(),
+            "padding": self.padding,
+            "rgbm": {
+                "range": rgbm_range(map),
+                "irradiance": "range * (alpha * colour)^2, W/m2 per channel",
+            },
+            "error": shown.map(|shown| json!({
+                "total": shown.total(),
+                "between_texels": shown.between.value,
+                "light": shown.of_light,
+            })),
+            "bake": { "error": baked.estimate.total, "outcome": baked.outcome.to_string() },
+        })
     }
 
     /// The curve of radiosity that the files of a bake are shown with.

@@ -23,7 +23,7 @@ STEM.probes.csv, a line a probe: along x, then rows along y, then layers along z
 probes in solids or behind walls: more backs than fronts and sky are visible there. Formulas and \
 formats: docs/grids_and_probes.md.")]
 pub struct Options {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
     /// Edge of a cell, scene unit, rounded so that cells fit

@@ -36,7 +36,7 @@ are path traced once, until the error of the finest run is known well enough, or
 After Ctrl-C the table of the finished runs is written. STEM is the scene's path and _trade_off \
 unless --out gives another.")]
 pub struct Options {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
     #[command(flatten)]

@@ -19,7 +19,7 @@ Prints UGR with the standard error by that of the background; writes STEM.ugr.cs
 source: luminance, cd/m², solid angle, sr, position index, and its L²ω/p². See \
 docs/daylight.md.")]
 pub struct Options {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
     /// Eye and line of sight of an observer, scene unit; may be repeated

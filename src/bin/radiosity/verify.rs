@@ -31,7 +31,7 @@ has, the \
 report of the bake, where there is one; the last line compares them. The options of the scene and \
 its light have to be those of the bake. After Ctrl-C the points so far count.")]
 pub struct Options {
-    /// Scene, an OBJ file
+    /// Scene: OBJ, glTF or STL
     #[arg(value_name = "SCENE.obj")]
     scene: PathBuf,
     /// Radiosity at vertices, a PLY file

@@ -1,5 +1,5 @@
 //! A scene with its light map as glTF binary: the scene's own triangles, and one image for all but
-//! textured ones. Those have their textures, times the map's light at vertices that are as dense as
+//! textured ones, or one for each page. Those have their textures, times the map's light at vertices that are as dense as
 //! texels: glTF has no material that multiplies two images.
 
 mod vertices;
@@ -22,17 +22,17 @@ use super::origin;
 use super::settings::GlbSettings;
 use crate::error::Error;
 use crate::io::cannot_write;
-use crate::light_map::LightMap;
+use crate::light_map::{LightMap, MapPage};
 use crate::scene::Rgb;
 use vertices::{Primitive, Vertex, primitives};
 
 /// Writes the scene of a light map as glTF 2.0 binary, `.glb`, with `POSITION`, `NORMAL` (of smooth
-/// surfaces), `TEXCOORD_1`, the coordinates in the light map, and `TEXCOORD_0`, those of the
+/// surfaces), `TEXCOORD_1`, the coordinates in the page of the light map, and `TEXCOORD_0`, those of the
 /// scene's file on materials all of whose faces have some, else the same as `TEXCOORD_1`.
 ///
 /// A node for each group and a primitive for each of its materials, by their names; materials and
 /// axes are as with [`write_glb`](crate::write_glb), and the two sides of a surface always lie
-/// apart. The file has the map's radiosity as an image (PNG) through a tone curve of radiosity, the
+/// apart. The file has the radiosity of each page as an image (PNG) through a tone curve of radiosity, the
 /// colour of the scene's own triangles. Triangles with a texture, of `map_Ke` before `map_Kd`, have
 /// that instead, cut to elements of two texels of the map, whose light is in `COLOR_0`. A program
 /// with a light map of its own multiplies the textures with the irradiance of
@@ -52,21 +52,30 @@ pub fn write_light_map_glb(
     let primitives = primitives(map, origin)?;
     let model = Model::new(map, &settings, &primitives).map_err(failed)?;
     let mut file = GlbFile::new(&model.notes());
-    // The first image. Without mipmaps, in which charts would run together.
-    let of_map = file.add_texture(Index::new(0), MinFilter::Linear, true);
+    // The first images. Without mipmaps, in which charts would run together.
+    let pages = map.atlas.pages();
+    let of_pages: Vec<Index<Texture>> = (0..pages.len() as u32)
+        .map(|page| file.add_texture(Index::new(page), MinFilter::Linear, true))
+        .collect();
     let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
     for of_group in primitives.chunk_by(|a, b| a.group == b.group) {
         let mut parts = vec![];
         for primitive in of_group {
-            let key = (primitive.material, primitive.shown.is_some());
-            let material = || model.add_material(&mut file, primitive, of_map);
+            let page = Some(primitive.page).filter(|_| primitive.shown.is_none());
+            let key = (primitive.material, page);
+            let material = || model.add_material(&mut file, primitive, of_pages[primitive.page]);
             let material = *materials.entry(key).or_insert_with(material);
             let attributes = model.add_attributes(&mut file, primitive);
             parts.push(file.triangles(attributes, &primitive.faces, material));
         }
         groups.push(file.add_group(&scene.groups()[of_group[0].group as usize], parts));
     }
-    file.add_image(model.image().map_err(failed)?, Some("light map"));
+    let radiosity = map.radiosity();
+    for page in (0..pages.len()).map(|k| map.page(k)) {
+        let group = page.page.group.map(|group| scene.groups()[group as usize].as_str());
+        let name = group.map_or("light map".into(), |group| format!("light map {group}"));
+        file.add_image(model.image(page, &radiosity).map_err(failed)?, Some(&name));
+    }
     for png in model.images.into_files() {
         file.add_image(png, None);
     }
@@ -103,13 +112,12 @@ impl Model<'_> {
         ])
     }
 
-    /// The light map as PNG, in colours.
-    fn image(&self) -> ImageResult<Vec<u8>> {
+    /// A page of the light map of this `radiosity` as PNG, in colours.
+    fn image(&self, page: MapPage, radiosity: &[Rgb]) -> ImageResult<Vec<u8>> {
         let tone = &self.settings.tone;
-        let colours = self.map.radiosity().into_iter();
+        let colours = page.of(radiosity).into_iter();
         let bytes: Vec<u8> = colours.flat_map(|c| tone.display(c)).collect();
-        let size = [self.map.atlas.width(), self.map.atlas.height()];
-        png(&bytes, size, ExtendedColorType::Rgb8)
+        png(&bytes, page.size(), ExtendedColorType::Rgb8)
     }
 
     fn add_material(
@@ -121,8 +129,8 @@ impl Model<'_> {
         let texture = match primitive.shown.zip(self.images.number(primitive.material)) {
             Some((shown, number)) => {
                 let clamped = shown.frame().is_some_and(|map| map.clamped);
-                // The light map is before them.
-                let source = Index::new(number as u32 + 1);
+                // The pages of the light map are before them.
+                let source = Index::new((number + self.map.atlas.pages().len()) as u32);
                 (file.add_texture(source, MinFilter::LinearMipmapLinear, clamped), 0)
             }
             None => (of_map, 1),

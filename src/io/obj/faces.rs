@@ -23,8 +23,8 @@ pub(super) struct Geometry {
 }
 
 impl ObjFile<'_> {
-    /// The vertices that faces use, in the order of the file, and the faces as triangles; with
-    /// texture coordinates if requested or if some material has a texture.
+    /// The vertices of the file, and its faces as triangles; with texture coordinates if requested
+    /// or if some material has a texture.
     pub(super) fn geometry(
         &mut self,
         models: Vec<tobj::Model>,
@@ -32,7 +32,7 @@ impl ObjFile<'_> {
         with_coordinates: bool,
     ) -> Result<Geometry, Error> {
         let mut geometry = Geometry {
-            positions: vec![DVec3::NAN; self.statements.vertices as usize],
+            positions: std::mem::take(&mut self.statements.positions),
             triangles: Vec::with_capacity(self.statements.faces.len()),
             texture_coordinates: vec![],
         };
@@ -44,9 +44,6 @@ impl ObjFile<'_> {
         for tobj::Model { mesh, .. } in models {
             let numbers;
             (numbers, order) = order.split_at(mesh.positions.len() / 3);
-            for (&number, p) in numbers.iter().zip(mesh.positions.chunks_exact(3)) {
-                geometry.positions[number as usize] = DVec3::new(p[0], p[1], p[2]);
-            }
             let arity = |k: usize| mesh.face_arities.get(k).map_or(3, |&arity| arity as usize);
             let (mut start, mut k) = (0, 0);
             while start < mesh.indices.len() {
@@ -71,7 +68,6 @@ impl ObjFile<'_> {
             };
             self.repairs.push(Warning::new(WarningKind::FaceWithoutMaterial, bare, done));
         }
-        geometry.drop_unused();
         Ok(geometry)
     }
 
@@ -104,25 +100,6 @@ impl ObjFile<'_> {
         let triangle = |t: [usize; 3]| Triangle { corners: t.map(|i| corners[i]), ..like };
         geometry.triangles.extend(pieces.into_iter().map(triangle));
         Ok(())
-    }
-}
-
-impl Geometry {
-    /// Drops the vertices that no face uses, which have no position.
-    fn drop_unused(&mut self) {
-        let mut used = 0;
-        let numbers: Vec<u32> = self
-            .positions
-            .iter()
-            .map(|p| {
-                used += u32::from(!p.is_nan());
-                used.saturating_sub(1)
-            })
-            .collect();
-        self.positions.retain(|p| !p.is_nan());
-        for triangle in &mut self.triangles {
-            triangle.corners = triangle.corners.map(|k| numbers[k as usize]);
-        }
     }
 }
 

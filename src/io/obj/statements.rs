@@ -24,6 +24,8 @@
 use std::collections::HashMap;
 use std::io::{self, Read, Write as _};
 
+use glam::DVec3;
+
 use super::super::mtl::Library;
 use super::super::text::{Line, finite, words};
 use super::repairs::Repairs;
@@ -86,7 +88,8 @@ pub(super) struct Statements {
     pub materials: Names,
     /// Line of the first use of each of them.
     pub first_use: Vec<u32>,
-    pub vertices: u32,
+    /// Positions of all vertices, used or not.
+    pub positions: Vec<DVec3>,
     pub texture_coordinates: u32,
     group_name: String,
     group: Option<u32>,
@@ -174,18 +177,15 @@ impl Statements {
                 line.parse_error(found, "coordinates must be finite numbers")
             })?;
         }
-        self.vertices += 1;
-        self.last_model.push(0);
-        if used == 3 {
-            emit(out, format_args!("v {} {} {}\n", words[0], words[1], words[2]));
-            return Ok(());
-        }
-        let [x, y, z] = [0, 1, 2].map(|k| numbers[k] / numbers[3]);
-        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+        let position = DVec3::from_slice(&numbers) / numbers[3];
+        if !position.is_finite() {
             let found = format!("weight {}", numbers[3]);
             return Err(line.parse_error(found, "leave the fourth number out"));
         }
-        emit(out, format_args!("v {x:e} {y:e} {z:e}\n"));
+        self.positions.push(position);
+        self.last_model.push(0);
+        // tobj has the faces alone to read.
+        emit(out, format_args!("v 0 0 0\n"));
         Ok(())
     }
 
@@ -325,8 +325,9 @@ impl Statements {
         if index == 0 {
             return bad("vertex index 0", "count from 1, or back from -1".into());
         }
-        let Some(vertex) = counted(index, self.vertices) else {
-            return match self.vertices {
+        let vertices = self.positions.len() as u32;
+        let Some(vertex) = counted(index, vertices) else {
+            return match vertices {
                 0 => bad("but no vertex so far", "put `v` lines above the faces".into()),
                 n => bad(
                     &format!("vertex index {index} of {n} vertices so far"),

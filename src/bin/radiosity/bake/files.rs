@@ -70,6 +70,9 @@ pub struct Files {
     /// Metres in the scene's unit.
     #[arg(skip = 1.0)]
     metres: f64,
+    /// Whether the light is on the scene's own mesh.
+    #[arg(skip)]
+    keeps_mesh: bool,
     #[arg(skip)]
     source: Option<Source>,
     /// Pixels of the picture
@@ -103,8 +106,13 @@ pub struct Picture {
 impl Files {
     /// Names the files after the scene, where they are given no name, and checks whether all of it
     /// can be written, before any work is done for it.
-    pub fn name_after(&mut self, scene: &Path, reading: &SceneOptions) -> Result<(), Error> {
-        self.metres = reading.unit;
+    pub fn name_after(
+        &mut self,
+        scene: &Path,
+        reading: &SceneOptions,
+        keeps_mesh: bool,
+    ) -> Result<(), Error> {
+        (self.metres, self.keeps_mesh) = (reading.unit, keeps_mesh);
         let of_scene =
             |ending| Source { path: scene.into(), ending, scene: reading.scene_name.clone() };
         self.source = gltf_ending(scene)?.map(of_scene);
@@ -171,11 +179,10 @@ impl Files {
     /// Writes meshes; their colours are those of the picture.
     fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) -> Result<(), Error> {
         if self.writes(Format::Ply) {
-            progress::of_writing(&self.output.path("ply"), |path| {
-                let mut surface = baked.light.surface.clone();
-                surface.comments = comments(baked);
-                write_ply_with_tone(path, &surface, tone)
-            })?;
+            let mut surface = self.surface(baked);
+            surface.comments = comments(baked);
+            let write = |path: &Path| write_ply_with_tone(path, &surface, tone);
+            progress::of_writing(&self.output.path("ply"), write)?;
         }
         if self.writes(Format::Glb) {
             self.write_glb(baked, &glb_settings(tone, self.metres, baked))?;
@@ -187,6 +194,21 @@ impl Files {
             })?;
         }
         Ok(())
+    }
+
+    /// The mesh of a PLY file: with the vertices of the scene's file where its mesh is kept.
+    fn surface(&self, baked: &BakeResult) -> VertexMesh {
+        if !self.keeps_mesh {
+            return baked.light.surface.clone();
+        }
+        let (surface, shared) = baked.light.at_positions();
+        if shared > 0 {
+            eprintln!(
+                "warning: {shared} vertices are shared by surfaces that meet in a crease: in the \
+                 PLY file they have the mean of these"
+            );
+        }
+        surface
     }
 
     /// Writes the glTF file of the scene with its light, or the mesh of the light.

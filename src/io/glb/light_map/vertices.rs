@@ -17,7 +17,7 @@ pub(super) struct Vertex {
     /// Relative to the origin, scene unit.
     pub position: Vec3,
     pub normal: Vec3,
-    /// Texture coordinates in the map and in the scene's file, v downwards; the latter not finite
+    /// Texture coordinates in the page of the map and in the scene's file, v downwards; the latter not finite
     /// where it has none.
     pub place: [f32; 2],
     pub given: [f32; 2],
@@ -34,11 +34,13 @@ impl Vertex {
     }
 }
 
-/// The triangles of one group and one material, with textures that they are shown with or without.
+/// The triangles of one group, one material and one page of the map, with textures that they are shown with or without.
 pub(super) struct Primitive<'a> {
     pub group: u32,
     pub material: u32,
     pub shown: Option<Shown<'a>>,
+    /// Index of the page of the map.
+    pub page: usize,
     pub vertices: Vec<Vertex>,
     /// Of each vertex if there is a texture, W/m² per channel.
     pub irradiances: Vec<Rgb>,
@@ -60,14 +62,15 @@ pub(super) fn primitives(map: &LightMap, origin: Vec3) -> Result<Vec<Primitive<'
             .is_some_and(|places| places.iter().all(|place| place.as_vec2().is_finite()));
         scene.textures(t).filter(|_| has_places).and_then(Shown::of)
     };
-    let mut all: BTreeMap<(u32, u32, bool), Primitive<'_>> = BTreeMap::new();
+    let mut all: BTreeMap<(u32, u32, bool, usize), Primitive<'_>> = BTreeMap::new();
     let mut add = |t: usize, weights: [[f64; 2]; 3]| {
         let (triangle, shown) = (&scene.triangles()[t], shown(t));
         let (group, material) = (triangle.group, triangle.material);
-        let primitive = all.entry((group, material, shown.is_some())).or_insert_with(|| {
+        let (page, _) = map.atlas.page_coordinates(t);
+        let primitive = all.entry((group, material, shown.is_some(), page)).or_insert_with(|| {
             let (vertices, irradiances, faces) = (vec![], vec![], vec![]);
             let numbers = FxHashMap::default();
-            Primitive { group, material, shown, vertices, irradiances, faces, numbers }
+            Primitive { group, material, shown, page, vertices, irradiances, faces, numbers }
         });
         let face = weights.map(|weights| primitive.number(&corners, t, weights));
         primitive.faces.push(face);
@@ -118,7 +121,7 @@ impl Corners<'_> {
             position: (position - self.origin.as_dvec3()).as_vec3(),
             // glTF allows only length 1.
             normal: at(self.normals[t]).as_vec3().normalize_or(Vec3::Y),
-            place: at_place(self.map.atlas.coordinates(t)).as_vec2().to_array(),
+            place: at_place(self.map.atlas.page_coordinates(t).1).as_vec2().to_array(),
             given: at_place(given_places(self.map, t)).as_vec2().to_array(),
         }
     }
