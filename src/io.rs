@@ -62,13 +62,15 @@ use crate::error::{Error, ErrorKind};
 #[cfg(feature = "exr")]
 pub use self::exr::write_exr;
 #[cfg(all(feature = "exr", feature = "light-map"))]
-pub use self::exr::{write_light_map_exr, write_light_map_radiosity};
+pub use self::exr::{write_light_map_directional, write_light_map_exr, write_light_map_radiosity};
 #[cfg(all(feature = "glb", feature = "light-map"))]
 pub use self::glb::write_light_map_glb;
 #[cfg(feature = "glb")]
 pub use self::glb::{GlbSettings, write_glb};
 #[cfg(feature = "glb")]
 pub use self::gltf::{LampUnits, LitVertices, gltf_ending, read_cameras, write_lit_gltf};
+#[cfg(all(feature = "glb", feature = "light-map"))]
+pub use self::gltf::{MapBinding, write_mapped_gltf};
 #[cfg(feature = "light-map")]
 pub use self::ktx2::write_light_map_ktx2;
 #[cfg(feature = "png")]

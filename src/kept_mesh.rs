@@ -91,7 +91,7 @@ impl BakeResult {
         // Plain choice: as fine as points that are evenly spread along a line.
         let finest = (0.5 / open.len().max(1) as f64).max(1.0 / 1024.0);
         let sampling = sampling_error(&kept, &open, floor);
-        // Rays that miss the error alone leave paths a quarter of it, since paths cost by the square.
+        // A quarter of it where rays leave less, since paths cost by the square.
         let left = (error.powi(2) - sampling.powi(2)).max((0.25 * error).powi(2)).sqrt();
         let goal = SurfaceGoal {
             error: left,

@@ -18,6 +18,7 @@ mod atlas;
 mod correction;
 mod coverage;
 mod dilation;
+mod directional;
 mod footprint;
 mod gathered;
 mod given_coordinates;

@@ -141,9 +141,9 @@ pub(crate) struct SurfaceGoal {
     pub finest: f64,
 }
 
-/// Corrects what was gathered of `light` at `count` points, which `point` gives by number, until the
-/// error of `goal` is reached or there are as many paths as can be. See [`correct_by_paths`] for
-/// `progress`.
+/// Corrects what was gathered of `light` at `count` points, which `point` gives by number, until
+/// the error of `goal` is reached or there are as many paths as can be. See [`correct_by_paths`]
+/// for `progress`.
 pub(crate) fn correct_surface(
     light: &GatheredMesh,
     count: usize,

@@ -23,9 +23,9 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
 }
 
 /// Writes the irradiance of a light map or a page of it, W/m², as a 32-bit float OpenEXR. Its
-/// channels are R, G, B, `coverage`, 1 where a texel gathered and 0 where it is empty or filled from
-/// its neighbours, and `error`, the standard error of a texel that gathered, W/m², a length over R,
-/// G and B. At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
+/// channels are R, G, B, `coverage`, 1 where a texel gathered and 0 where it is empty or filled
+/// from its neighbours, and `error`, the standard error of a texel that gathered, W/m², a length
+/// over R, G and B. At the first row texture coordinate v is 0 as in glTF, and 1 as in OBJ files.
 ///
 /// # Errors
 /// Those of [`write_exr`].
@@ -41,6 +41,29 @@ pub fn write_light_map_exr<'a>(
     let coverage = gathered.into_iter().map(|gathered| f32::from(u8::from(gathered))).collect();
     let error = page.of(&map.standard_error).into_iter().map(|error| error as f32).collect();
     write(path, page.size(), vec![r, g, b, ("coverage", coverage), ("error", error)])
+}
+
+/// Writes how the irradiance of a light map or a page of it changes with the normal, W/m², as a
+/// 32-bit float OpenEXR with channels `x.R` to `z.B`: `changes` are those of
+/// [`LightMap::directional`](crate::light_map::LightMap::directional).
+///
+/// # Errors
+/// Those of [`write_exr`].
+#[cfg(feature = "light-map")]
+pub fn write_light_map_directional<'a>(
+    path: impl AsRef<Path>,
+    map: impl Into<MapPage<'a>>,
+    changes: &[Vec<Rgb>; 3],
+) -> Result<(), Error> {
+    let page = map.into();
+    let names = [["x.R", "x.G", "x.B"], ["y.R", "y.G", "y.B"], ["z.R", "z.G", "z.B"]];
+    let mut channels = vec![];
+    for (names, values) in names.into_iter().zip(changes) {
+        let of_axis =
+            rgb(path.as_ref(), page.size(), &page.of(values), ["change of irradiance", "W/m²"])?;
+        channels.extend(names.into_iter().zip(of_axis).map(|(name, (_, values))| (name, values)));
+    }
+    write(path.as_ref(), page.size(), channels)
 }
 
 /// Writes the radiosity of a light map or a page of it, W/m², as a 32-bit float OpenEXR with

@@ -36,6 +36,8 @@ use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
 use crate::scene::Rgb;
 use file::{Attributes, GlbFile};
+#[cfg(feature = "light-map")]
+pub(super) use images::png;
 use images::{Images, mean_radiosity};
 #[cfg(feature = "light-map")]
 pub use light_map::write_light_map_glb;

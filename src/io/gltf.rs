@@ -10,6 +10,7 @@
 //! animation does no harm, and all numbers keep 64 bits.
 
 mod accessors;
+mod additions;
 mod container;
 mod document;
 mod fault;
@@ -17,6 +18,8 @@ mod geometry;
 mod images;
 mod lights;
 mod lit;
+#[cfg(feature = "light-map")]
+mod mapped;
 mod materials;
 mod nodes;
 
@@ -43,6 +46,8 @@ use images::Images;
 pub use lights::LampUnits;
 use lights::Lamps;
 pub use lit::{LitVertices, write_lit_gltf};
+#[cfg(feature = "light-map")]
+pub use mapped::{MapBinding, write_mapped_gltf};
 use materials::MaterialReader;
 use nodes::{Nodes, Placed};
 

@@ -1,9 +1,9 @@
 //! Light maps as PNG images of 8 bits with a common factor in alpha (RGBM).
 //!
-//! A texel stands for range · (alpha · colour)², channel by channel, with alpha and colour in [0, 1]:
-//! the square spends the 8 bits on dark texels as sRGB does. Alpha is the smallest of 255 steps with
-//! which the brightest channel can be represented, so that a channel is off by no more than the
-//! square of half a step of colour, 0.4 % of the brightest one.
+//! A texel stands for range · (alpha · colour)², channel by channel, with alpha and colour in [0,
+//! 1]: the square spends the 8 bits on dark texels as sRGB does. Alpha is the smallest of 255 steps
+//! with which the brightest channel can be represented, so that a channel is off by half a step of
+//! colour, squared: 0.4 % of the brightest one.
 
 use std::path::Path;
 

@@ -166,18 +166,27 @@ pub(super) fn gatherer<'a>(
     baked: &BakeResult,
     backend: &Backend,
 ) -> Result<Box<dyn Gather + 'a>, Error> {
+    gatherer_past(baked, backend, true)
+}
+
+/// The same, which leaves near surfaces to paths where they have a `near_field` of their own.
+pub(super) fn gatherer_past<'a>(
+    baked: &BakeResult,
+    backend: &Backend,
+    near_field: bool,
+) -> Result<Box<dyn Gather + 'a>, Error> {
     let dim = baked.light.radiosity_field().radiosity_floor(baked.settings.measure.floor);
     let (rays, noise) = match &baked.settings.gather {
         Some(settings) => (settings.rays, settings.noise_tolerance),
         // For an error of about 2 %.
         None => (1024, f64::INFINITY),
     };
-    let rays = GatherRays { rays, noise, dim, near_field: true };
+    let rays = GatherRays { rays, noise, dim, near_field };
     backend.gather_with_fallback(&baked.light.mesh, rays, |_| ())
 }
 
 /// Fills empty texels next to charts from their neighbours.
-fn dilate(values: &mut [Rgb], triangles: &[u32], atlas: &Atlas) {
+pub(super) fn dilate(values: &mut [Rgb], triangles: &[u32], atlas: &Atlas) {
     let mut known: Vec<bool> = triangles.iter().map(|&t| t != NO_TRIANGLE).collect();
     let empty = (0..known.len() as u32).filter(|&k| !known[k as usize]).collect();
     let rings = atlas.filled_texels() as usize;

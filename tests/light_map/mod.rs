@@ -1,5 +1,6 @@
 mod atlas;
 mod correction;
+mod directional;
 mod files;
 mod light;
 mod pages;

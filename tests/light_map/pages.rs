@@ -176,7 +176,7 @@ fn rgbm_and_ktx2_are_read_by_others_within_their_precision() {
     };
     // Half a step of 1/512, relative to up to twice the brightest channel, and 32 bits of places.
     pages_show_the_map(&map, of_ktx2, 1.0 / 512.0 + 1e-3);
-    // Texels are off by (1 + d)² − 1, d half a step of colour over alpha's own step less: the box has
-    // light of a thousandth of the range, with an alpha of 8 steps, d = 0.5/255 · 8/7.
+    // Texels are off by (1 + d)² − 1, d half a step of colour over alpha's own step less: the box
+    // has light of a thousandth of the range, with an alpha of 8 steps, d = 0.5/255 · 8/7.
     pages_show_the_map(&map, of_rgbm, 2.0 * 0.5 / 255.0 * 8.0 / 7.0 + 2e-3);
 }

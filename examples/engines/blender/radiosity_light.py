@@ -125,7 +125,7 @@ def store(item, light):
     world, turn = item.matrix_world, item.matrix_world.inverted_safe().transposed().to_3x3()
     if hasattr(mesh, "calc_normals_split"):
         mesh.calc_normals_split()
-    size = max((Vector(p).length for p in item.bound_box), default=1.0) * max(world.to_scale()) + 1e-12
+    size = max((world @ Vector(p) - world.translation).length for p in item.bound_box) + 1e-12
     old = mesh.color_attributes.get(ATTRIBUTE)
     if old:
         mesh.color_attributes.remove(old)
@@ -203,9 +203,10 @@ def main(options):
             missing += store(item, lights[item.name])
             lit += 1
             for slot in item.material_slots:
-                if slot.material:
+                material = slot.material
+                if material:
                     slot.link = "OBJECT"
-                    slot.material = show(slot.material)
+                    slot.material = show(material)
     # Light is exposed by the scene, once.
     bpy.context.scene.view_settings.view_transform = "Standard"
     print(f"radiosity: light on {lit} objects, {missing} corners without")

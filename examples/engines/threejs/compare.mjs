@@ -1,6 +1,6 @@
 // Shows a baked file in index.html in headless Chromium, and compares that with the picture that
 // `radiosity` drew of it: exit status 1 where they differ by more than 2 % RMS of white.
-//   node compare.mjs REPORT.json FILE.glb PICTURE.png [MAP.exr] [--out SHOT.png]
+//   node compare.mjs REPORT.json FILE.glb PICTURE.png [--out SHOT.png]
 // REPORT.json is that of the bake: camera and exposure. CHROMIUM names the browser
 // [/usr/bin/chromium].
 import { createServer } from 'node:http';
@@ -9,21 +9,23 @@ import path from 'node:path';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
 
-const { values, positionals: [reportFile, file, picture, map] } = parseArgs({
+const { values, positionals: [reportFile, file, picture] } = parseArgs({
   allowPositionals: true,
   options: { out: { type: 'string' } },
 });
 if (!picture) {
-  console.error('usage: node compare.mjs REPORT.json FILE.glb PICTURE.png [MAP.exr] [--out SHOT.png]');
+  console.error('usage: node compare.mjs REPORT.json FILE.glb PICTURE.png [--out SHOT.png]');
   process.exit(2);
 }
 const { camera, exposure } = JSON.parse(await readFile(reportFile, 'utf8'));
 const types = { '.html': 'text/html', '.js': 'text/javascript' };
 const here = import.meta.dirname;
-const given = { '/file.glb': file, '/map.exr': map, '/picture.png': picture };
 const server = createServer(async (request, response) => {
   const { pathname } = new URL(request.url, 'http://localhost');
-  const target = given[pathname] ?? path.join(here, path.normalize(pathname));
+  // The folder of the file has its light maps.
+  const target = pathname === '/picture.png' ? picture
+    : pathname.startsWith('/file/') ? path.join(path.dirname(file), path.basename(pathname))
+    : path.join(here, path.normalize(pathname));
   try {
     const bytes = await readFile(target);
     response.writeHead(200, { 'content-type': types[path.extname(target)] ?? 'application/octet-stream' }).end(bytes);
@@ -44,9 +46,8 @@ try {
   page.on('console', (message) => message.type() === 'error' && console.error(message.text()));
   page.on('pageerror', (error) => console.error(error));
   const query = new URLSearchParams({
-    file: 'file.glb', exposure, eye: camera.eye, target: camera.target, fov: camera.vertical_fov,
+    file: `file/${path.basename(file)}`, exposure, eye: camera.eye, target: camera.target, fov: camera.vertical_fov,
   });
-  if (map) query.set('map', 'map.exr');
   await page.goto(`${root}/index.html?${query}`);
   await page.waitForFunction('window.isShown', null, { timeout: 60000 });
   const shot = await page.screenshot();

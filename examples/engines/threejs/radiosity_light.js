@@ -6,19 +6,24 @@ import * as THREE from 'three';
 
 // Materials of all meshes below `root` reflect the irradiance of their vertices: the attribute
 // _IRRADIANCE, W/m2 per channel, of `radiosity bake SCENE.glb`. Colours of vertices that show it to
-// other programs (COLOR_0) are switched off.
+// other programs (COLOR_0) are switched off. False where no mesh has it.
 export function lightVertices(root) {
   const known = new Map();
   root.traverse((mesh) => {
-    if (!mesh.isMesh || !mesh.geometry.attributes._irradiance) return;
-    if (!known.has(mesh.material)) known.set(mesh.material, litByVertices(mesh.material));
-    mesh.material = known.get(mesh.material);
+    // The mesh of `bake --refine` has its radiosity, too, and shows that.
+    const { _irradiance, _radiosity } = mesh.isMesh ? mesh.geometry.attributes : {};
+    if (!_irradiance || _radiosity) return;
+    const isLight = mesh.geometry.userData.radiosity?.COLOR_0 === 'light';
+    const key = `${mesh.material.uuid} ${isLight}`;
+    if (!known.has(key)) known.set(key, litByVertices(mesh.material, isLight));
+    mesh.material = known.get(key);
   });
+  return known.size > 0;
 }
 
-function litByVertices(source) {
+function litByVertices(source, colourIsLight) {
   const material = source.clone();
-  material.vertexColors = false;
+  if (colourIsLight) material.vertexColors = false;
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = shader.vertexShader
       .replace('void main() {', 'attribute vec3 _irradiance;\nvarying vec3 vIrradiance;\nvoid main() {\nvIrradiance = _irradiance;');
@@ -30,27 +35,37 @@ function litByVertices(source) {
   return material;
 }
 
-// Materials of all meshes below `root`, the GLB of `radiosity light-map`, show their light map: an
-// EXR file, irradiance in W/m2, which `texture` was loaded from by EXRLoader.
-export function lightMap(root, texture) {
-  // EXRLoader has the last row first, and TEXCOORD_1 has v = 0 at the first row.
-  texture.channel = 1;
+// Materials of all meshes below `root`, the file of `radiosity light-map SCENE.glb`, get the light
+// maps that it names, irradiance in W/m2. `load` gives the texture of a file, as EXRLoader's loadAsync
+// does. False where no mesh names any.
+export async function lightByMaps(root, load) {
+  const meshes = [];
+  root.traverse((mesh) => mesh.isMesh && mesh.geometry.userData.radiosity?.lightMap && meshes.push(mesh));
+  const textures = new Map();
+  const materials = new Map();
+  for (const mesh of meshes) {
+    const { lightMap, texCoord } = mesh.geometry.userData.radiosity;
+    if (!textures.has(lightMap)) textures.set(lightMap, prepared(await load(lightMap), texCoord));
+    const key = `${mesh.material.uuid} ${lightMap} ${texCoord}`;
+    if (!materials.has(key)) {
+      const material = mesh.material.clone();
+      material.lightMap = textures.get(lightMap);
+      materials.set(key, material);
+    }
+    mesh.material = materials.get(key);
+  }
+  return meshes.length > 0;
+}
+
+function prepared(texture, texCoord) {
+  // EXRLoader has the last row first, and glTF has v = 0 at the first row.
+  texture.channel = texCoord;
   texture.wrapT = THREE.RepeatWrapping;
   texture.repeat.set(1, -1);
   texture.offset.set(0, 1);
   texture.minFilter = texture.magFilter = THREE.LinearFilter;
   texture.generateMipmaps = false;
-  root.traverse((mesh) => {
-    if (!mesh.isMesh) return;
-    // The file shows its light as colours; beside them it has what surfaces are.
-    const { reflectance = [0.5, 0.5, 0.5], exitance = [0, 0, 0] } = mesh.material.userData;
-    mesh.material = new THREE.MeshLambertMaterial({
-      color: new THREE.Color(...reflectance),
-      emissive: new THREE.Color(...exitance.map((x) => x / Math.PI)),
-      lightMap: texture,
-      side: mesh.material.side,
-    });
-  });
+  return texture;
 }
 
 // The tone curve of the program's pictures (Reinhard, Stark, Shirley, Ferwerda 2002, equation 4, on

@@ -49,8 +49,8 @@ pub struct Bake {
     /// not linear on them; all, of elements that are all split once
     #[arg(long, value_name = "WHICH", hide_possible_values = true)]
     gather: Option<Gather>,
-    /// Light at the file's own vertices, in their order, and nothing split: the error is that of the
-    /// vertices alone
+    /// Light at the file's own vertices, in their order, and nothing split: the error is that of
+    /// the vertices alone
     #[arg(long, conflicts_with_all = ["error_each", "time", "gather", "bands", "pixel_gather"])]
     keep_mesh: bool,
     /// Set a setting of the library, as rays=512; may be repeated

@@ -1,31 +1,26 @@
 //! `radiosity light-map`: the irradiance of a scene's surfaces in a texture.
 
-use std::collections::HashSet;
+mod files;
+
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use radiosity::io::{
-    ToneCurve, rgbm_range, write_light_map_exr, write_light_map_glb, write_light_map_ktx2,
-    write_light_map_radiosity, write_light_map_rgbm, write_ply_with_tone, write_png_with_tone,
-};
-use radiosity::light_map::{
-    Atlas, Coordinates, LayoutSettings, LightMap, MapPage, Maps, Page, Resolution,
-};
+use files::{BINDINGS, Bind, FORMATS, Format, print_layout};
+use radiosity::light_map::{Atlas, Coordinates, LayoutSettings, LightMap, Maps, Resolution};
 use radiosity::verify::Estimate;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Scene, Sky};
-use serde_json::{Value, json};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Rgb, Scene, Sky};
 
 use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
 };
-use crate::bake::files::{self, SAMPLES};
+use crate::bake::files::SAMPLES;
 use crate::camera_option::CameraOption;
 use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
-use crate::viewer_options::{ViewerOptions, glb_settings};
+use crate::viewer_options::ViewerOptions;
 
 /// Texels along a side where the error asked for says how many: the fewest and the most.
 const PIXELS: RangeInclusive<u32> = 64..=2048;
@@ -34,33 +29,8 @@ const PIXELS: RangeInclusive<u32> = 64..=2048;
 /// squares add up. Plain choice: as many texels again would leave more than paths cost.
 const BETWEEN_TEXELS: f64 = 0.8;
 
-/// Bytes of memory for a texel of a map: irradiance, error, triangle and whether it gathered.
-const BYTES_OF_TEXEL: f64 = 24.0 + 8.0 + 4.0 + 2.0;
-
 /// Pixels of the picture.
 const PICTURE: [u32; 2] = [768, 512];
-
-/// A kind of file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Format {
-    Exr,
-    Glb,
-    Ply,
-    Png,
-    Rgbm,
-    Ktx2,
-    Json,
-}
-
-const FORMATS: Names<Format> = &[
-    ("exr", Format::Exr),
-    ("glb", Format::Glb),
-    ("ply", Format::Ply),
-    ("png", Format::Png),
-    ("rgbm", Format::Rgbm),
-    ("ktx2", Format::Ktx2),
-    ("json", Format::Json),
-];
 
 const COORDINATES: Names<Coordinates> =
     &[("auto", Coordinates::Auto), ("file", Coordinates::Given), ("new", Coordinates::Unwrapped)];
@@ -117,13 +87,23 @@ pub struct Options {
     /// new, charts for all smooth surfaces; auto, those of the file where they can be used
     #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = one_of(COORDINATES))]
     coordinates: Coordinates,
+    /// Write STEM.directional.exr: how irradiance changes with the normal, b = (x, y, z) of E + b ·
+    /// (n' − n), for normal maps
+    #[arg(long)]
+    directional: bool,
+    /// How the file of a glTF scene names the map, in which all else stays as it is: extras, of
+    /// primitives, for programs that set the map themselves; emissive, of materials that show the
+    /// scene's radiosity; occlusion, of materials, as brightness; none, for a file as those of OBJ
+    /// scenes [default: extras]
+    #[arg(long, value_name = "HOW", value_parser = one_of(BINDINGS))]
+    bind: Option<Bind>,
     /// Write STEM.radiosity.exr: what surfaces emit and reflect, without textures
     #[arg(long)]
     radiosity: bool,
     #[command(flatten)]
     output: Output,
-    /// Files: exr; glb; ktx2, with a common exponent (E5B9G9R9); rgbm, STEM.rgbm.png; json, what the
-    /// maps are; ply, the scene cut to pieces of two texels with the light of the map, for
+    /// Files: exr; glb; ktx2, with a common exponent (E5B9G9R9); rgbm, STEM.rgbm.png; json, what
+    /// the maps are; ply, the scene cut to pieces of two texels with the light of the map, for
     /// `radiosity verify`; png, a picture of that
     #[arg(long = "write", value_name = "FORMATS", value_parser = some_of(FORMATS))]
     #[arg(default_value = "exr,glb")]
@@ -141,7 +121,7 @@ pub struct Options {
 }
 
 /// How far off what a map shows is, and by what.
-struct Shown {
+pub struct Shown {
     /// What is lost of the light between texels.
     between: Estimate,
     /// Error of the light at texels.
@@ -185,52 +165,12 @@ fn print_map(map: &LightMap, baked: &BakeResult) {
     );
 }
 
-/// What files of each page of `atlas` have before their endings: nothing for the only one, its
-/// group's name in characters that all systems have in names of files, or its number.
-fn page_names(atlas: &Atlas) -> Vec<String> {
-    let groups = atlas.scene().groups();
-    let mut known = HashSet::new();
-    let name = |(k, page): (usize, &Page)| {
-        let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
-        let number = (k + 1).to_string();
-        let name = match page.group {
-            Some(group) => groups[group as usize].chars().map(plain).collect(),
-            None if atlas.pages().len() == 1 => return String::new(),
-            None => number.clone(),
-        };
-        // Systems may take upper and lower case for the same.
-        let is_new = known.insert(name.to_lowercase());
-        if is_new { format!("{name}.") } else { format!("{name}-{number}.") }
-    };
-    atlas.pages().iter().enumerate().map(name).collect()
-}
-
-/// Prints the maps of `atlas` and what they will take.
-fn print_layout(atlas: &Atlas) {
-    let texels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-    let megabytes = |bytes: f64| bytes / f64::from(1 << 20);
-    say!("map                              texels     exr, ktx2, rgbm at most, MiB");
-    for (name, page) in page_names(atlas).iter().zip(atlas.pages()) {
-        let [width, height] = page.size;
-        let name = if name.is_empty() { "all" } else { name.trim_end_matches('.') };
-        let [exr, packed] = [20.0, 4.0].map(|bytes| megabytes(bytes * texels(page.size)));
-        let size = format!("{width} × {height}");
-        say!("{name:<30} {size:>12} {exr:>9.2} {packed:>9.2} {packed:>9.2}");
-    }
-    let all: f64 = atlas.pages().iter().map(|page| texels(page.size)).sum();
-    let memory = megabytes(BYTES_OF_TEXEL * texels([atlas.width(), atlas.height()]));
-    say!(
-        "{} maps, {all} texels of about {:.4}; {memory:.0} MiB of memory for them",
-        atlas.pages().len(),
-        atlas.texel_size()
-    );
-}
-
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
         self.camera.find(&self.scene, PICTURE, SAMPLES)?;
         self.viewer.check()?;
+        self.binding()?;
         let endings = args::names(FORMATS);
         self.output.name(self.scene.with_extension("light-map"), &endings)?;
         let start = Instant::now();
@@ -251,12 +191,13 @@ impl Options {
         })?;
         let bake = start.elapsed().as_secs_f64();
         let (map, shown) = self.map(atlas, &baked, &device)?;
+        let directional = self.directional(&map, &baked, &device)?;
         let texels = start.elapsed().as_secs_f64();
         if self.reading.sky.is_default() {
             // As in the picture of a bake.
             baked.light.surface.sky = Sky::default();
         }
-        self.write(&map, &baked, shown.as_ref())?;
+        self.write(&map, &baked, shown.as_ref(), directional.as_ref())?;
         print_map(&map, &baked);
         let total = start.elapsed().as_secs_f64();
         say!(
@@ -327,6 +268,23 @@ impl Options {
             None => Maps::One,
         };
         Atlas::with_settings(scene, &settings)
+    }
+
+    /// How irradiance changes with the normal, if that is asked for.
+    fn directional(
+        &self,
+        map: &LightMap,
+        baked: &BakeResult,
+        device: &Backend,
+    ) -> Result<Option<[Vec<Rgb>; 3]>, Stop> {
+        if !self.directional {
+            return Ok(None);
+        }
+        args::end()?;
+        let changes = progress::of_stoppable("texels with tilted normals", |report| {
+            map.directional(baked, device, report)
+        })?;
+        changes.map(Some).ok_or(Stop::Interrupted)
     }
 
     /// The map of `baked`, corrected by paths, and how far off it is; with as many texels as that
@@ -422,101 +380,5 @@ impl Options {
             if is_reached { "reached" } else { "missed" }
         );
         is_reached
-    }
-
-    fn write(
-        &self,
-        map: &LightMap,
-        baked: &BakeResult,
-        shown: Option<&Shown>,
-    ) -> Result<(), Error> {
-        let writes = |format: Format| self.formats.contains(&format);
-        let path = |ending: &str| self.output.path(ending);
-        let range = rgbm_range(map);
-        for (k, name) in page_names(&map.atlas).iter().enumerate() {
-            let (page, path) = (map.page(k), |ending: &str| path(&format!("{name}{ending}")));
-            let write = |ending: &str, write: &dyn Fn(&Path, MapPage) -> Result<(), Error>| {
-                progress::of_writing(&path(ending), |path| write(path, page))
-            };
-            if writes(Format::Exr) {
-                write("exr", &|path, page| write_light_map_exr(path, page))?;
-            }
-            if self.radiosity {
-                write("radiosity.exr", &|path, page| write_light_map_radiosity(path, page))?;
-            }
-            if writes(Format::Ktx2) {
-                write("ktx2", &|path, page| write_light_map_ktx2(path, page))?;
-            }
-            if writes(Format::Rgbm) {
-                write("rgbm.png", &|path, page| write_light_map_rgbm(path, page, range))?;
-            }
-        }
-        // The range of RGBM is in the report.
-        if writes(Format::Json) || writes(Format::Rgbm) {
-            let report = self.report(map, baked, shown);
-            self.output.write("json", format!("{report:#}\n").as_bytes())?;
-        }
-        if !writes(Format::Glb) && !writes(Format::Ply) && !writes(Format::Png) {
-            return Ok(());
-        }
-        let tone = self.tone(baked)?;
-        if writes(Format::Glb) {
-            let settings = glb_settings(&tone, self.reading.unit, baked);
-            let write = |path: &Path| write_light_map_glb(path, map, settings.clone());
-            progress::of_writing(&path("glb"), write)?;
-        }
-        if !writes(Format::Ply) && !writes(Format::Png) {
-            return Ok(());
-        }
-        let surface = progress::of_stage("cutting the scene to texels", || map.surface())?;
-        if writes(Format::Ply) {
-            progress::of_writing(&path("ply"), |path| write_ply_with_tone(path, &surface, &tone))?;
-        }
-        if writes(Format::Png) {
-            let [width, height] = PICTURE;
-            let image =
-                self.camera.of(&baked.light, PICTURE).image(&surface, width, height, SAMPLES)?;
-            let tone = self.viewer.of_picture(&image);
-            progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
-        }
-        Ok(())
-    }
-
-    /// What the maps are, for programs that use them.
-    fn report(&self, map: &LightMap, baked: &BakeResult, shown: Option<&Shown>) -> Value {
-        let atlas = &map.atlas;
-        let groups = atlas.scene().groups();
-        let pages = page_names(atlas).into_iter().zip(atlas.pages()).map(|(name, page)| {
-            let group = page.group.map(|group| &groups[group as usize]);
-            json!({ "name": name.trim_end_matches('.'), "group": group, "size": page.size })
-        });
-        json!({
-            "maps": pages.collect::<Vec<_>>(),
-            "texel": atlas.texel_size(),
-            "padding": self.padding,
-            "rgbm": {
-                "range": rgbm_range(map),
-                "irradiance": "range * (alpha * colour)^2, W/m2 per channel",
-            },
-            "error": shown.map(|shown| json!({
-                "total": shown.total(),
-                "between_texels": shown.between.value,
-                "light": shown.of_light,
-            })),
-            "bake": { "error": baked.estimate.total, "outcome": baked.outcome.to_string() },
-        })
-    }
-
-    /// The curve of radiosity that the files of a bake are shown with.
-    fn tone(&self, baked: &BakeResult) -> Result<ToneCurve, Error> {
-        if let Some(given) = self.viewer.given() {
-            return Ok(given.of_radiosity());
-        }
-        let [width, height] = files::IMAGE;
-        let camera = self.camera.of(&baked.light, files::IMAGE);
-        let image = progress::of_count("pixels of the picture", |report| {
-            camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
-        })?;
-        Ok(self.viewer.of_meshes(image.as_ref(), baked))
     }
 }

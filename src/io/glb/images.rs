@@ -149,7 +149,7 @@ impl Texels<'_> {
 }
 
 /// A PNG file of these pixels.
-pub(super) fn png(
+pub(in crate::io) fn png(
     bytes: &[u8],
     [width, height]: [u32; 2],
     format: ExtendedColorType,

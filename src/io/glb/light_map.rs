@@ -1,6 +1,6 @@
 //! A scene with its light map as glTF binary: the scene's own triangles, and one image for all but
-//! textured ones, or one for each page. Those have their textures, times the map's light at vertices that are as dense as
-//! texels: glTF has no material that multiplies two images.
+//! textured ones, or one for each page. Those have their textures, times the map's light at
+//! vertices that are as dense as texels: glTF has no material that multiplies two images.
 
 mod vertices;
 
@@ -27,15 +27,15 @@ use crate::scene::Rgb;
 use vertices::{Primitive, Vertex, primitives};
 
 /// Writes the scene of a light map as glTF 2.0 binary, `.glb`, with `POSITION`, `NORMAL` (of smooth
-/// surfaces), `TEXCOORD_1`, the coordinates in the page of the light map, and `TEXCOORD_0`, those of the
-/// scene's file on materials all of whose faces have some, else the same as `TEXCOORD_1`.
+/// surfaces), `TEXCOORD_1`, the coordinates in the page of the light map, and `TEXCOORD_0`, those
+/// of the scene's file on materials all of whose faces have some, else the same as `TEXCOORD_1`.
 ///
 /// A node for each group and a primitive for each of its materials, by their names; materials and
 /// axes are as with [`write_glb`](crate::write_glb), and the two sides of a surface always lie
-/// apart. The file has the radiosity of each page as an image (PNG) through a tone curve of radiosity, the
-/// colour of the scene's own triangles. Triangles with a texture, of `map_Ke` before `map_Kd`, have
-/// that instead, cut to elements of two texels of the map, whose light is in `COLOR_0`. A program
-/// with a light map of its own multiplies the textures with the irradiance of
+/// apart. The file has the radiosity of each page as an image (PNG) through a tone curve of
+/// radiosity, the colour of the scene's own triangles. Triangles with a texture, of `map_Ke` before
+/// `map_Kd`, have that instead, cut to elements of two texels of the map, whose light is in
+/// `COLOR_0`. A program with a light map of its own multiplies the textures with the irradiance of
 /// [`write_light_map_exr`](crate::io::write_light_map_exr) instead.
 ///
 /// # Errors

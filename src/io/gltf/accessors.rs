@@ -174,7 +174,7 @@ impl<'a> Values<'a> {
     }
 
     fn bytes(&self, item: usize) -> Option<&[u8]> {
-        let size = self.components * self.component.bytes();
+        let size = self.item_bytes();
         let at = self.replaced.partition_point(|&(index, _)| index < item);
         match (self.replaced.get(at), self.view) {
             (Some(&(index, place)), _) if index == item => {
@@ -186,6 +186,21 @@ impl<'a> Values<'a> {
             }
             _ => None,
         }
+    }
+
+    /// Bytes of an item.
+    pub fn item_bytes(&self) -> usize {
+        self.components * self.component.bytes()
+    }
+
+    /// The bytes of item `item`: zeros where it has none.
+    pub fn raw(&self, item: usize) -> Vec<u8> {
+        self.bytes(item).map_or_else(|| vec![0; self.item_bytes()], <[u8]>::to_vec)
+    }
+
+    /// Item `item` as the numbers that the file has, without normalisation.
+    pub fn raw_numbers<const N: usize>(&self, item: usize) -> [f64; N] {
+        self.scaled(item, false)
     }
 
     /// Item `item`, as floats; components that it does not have are 0.

@@ -391,7 +391,7 @@ impl MeshReader<'_, '_> {
 }
 
 /// The corners of each triangle of `count` corners in a row: a list, a strip or a fan.
-fn triangles_of(
+pub(super) fn triangles_of(
     mode: Option<u32>,
     count: usize,
 ) -> Result<impl ExactSizeIterator<Item = [usize; 3]>, Fault> {
@@ -409,7 +409,7 @@ fn triangles_of(
     }))
 }
 
-fn check_number(triangles: usize) -> Result<(), Fault> {
+pub(super) fn check_number(triangles: usize) -> Result<(), Fault> {
     if triangles <= MAX_TRIANGLES {
         return Ok(());
     }

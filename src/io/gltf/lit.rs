@@ -14,6 +14,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use serde_json::{Value, json};
 
 use super::accessors::Values;
+use super::additions::{ARRAY_BUFFER, Additions, add_extras};
 use super::container::{Buffers, Container};
 use super::document::Document;
 use super::fault::Fault;
@@ -22,9 +23,9 @@ use super::materials;
 use super::nodes::Nodes;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
+use crate::io::cannot_read;
 use crate::io::files::{FileSource, MAX_BYTES, read_bytes};
 use crate::io::glb::GlbSettings;
-use crate::io::{cannot_read, cannot_write, write_file};
 use crate::scene::Rgb;
 
 /// Cosine below which two normals at one point are of different surfaces: 20°, half of
@@ -69,19 +70,16 @@ pub fn write_lit_gltf(
         reader: MeshReader::new(&document, &buffers, &nodes, &set_of),
         light: LightOfGroups::new(light),
         settings: settings.into(),
-        buffer: container.buffer_of_new(&document),
         is_placed: nodes.is_placed(),
-        json: container.json().map_err(at_source)?,
-        binary: vec![],
+        new: Additions::new(&container, &document).map_err(at_source)?,
         known: FxHashMap::default(),
         counts: LitVertices::default(),
     };
     for (number, group) in (0u32..).zip(&geometry.places) {
         writer.light_node(number, group).map_err(at_source)?;
     }
-    let Writer { json, binary, counts, .. } = writer;
-    let file = container.with(json, &binary, &document).map_err(|e| cannot_write(path, e))?;
-    write_file(path, |out| std::io::Write::write_all(out, &file))?;
+    let Writer { new, counts, .. } = writer;
+    new.write(path, &container, &document)?;
     Ok(counts)
 }
 
@@ -160,13 +158,9 @@ struct Writer<'a, 'b> {
     reader: MeshReader<'a, 'b>,
     light: LightOfGroups,
     settings: GlbSettings,
-    /// The buffer of new numbers, and how many bytes it has before them.
-    buffer: (usize, usize),
     /// Whether each node is in the scene.
     is_placed: Vec<bool>,
-    json: Value,
-    /// New numbers.
-    binary: Vec<u8>,
+    new: Additions,
     /// Of each mesh of the source.
     known: FxHashMap<usize, Vec<LitMesh>>,
     counts: LitVertices,
@@ -191,7 +185,7 @@ impl Writer<'_, '_> {
             Some(number) => number,
             None => self.add_mesh(mesh, irradiance),
         };
-        self.json["nodes"][group.node]["mesh"] = json!(number);
+        self.new.json["nodes"][group.node]["mesh"] = json!(number);
         Ok(())
     }
 
@@ -239,8 +233,8 @@ impl Writer<'_, '_> {
             .into_iter()
             .any(|(k, node)| !self.is_placed[k] || node.extensions.instances.is_some());
         let number = if self.known.contains_key(&mesh) || is_shared {
-            let copy = self.document_mesh(mesh);
-            push(&mut self.json, "meshes", copy)
+            let copy = self.new.source["meshes"][mesh].clone();
+            self.new.push("meshes", copy)
         } else {
             mesh
         };
@@ -258,30 +252,20 @@ impl Writer<'_, '_> {
                     added
                 }
             };
-            let to = &mut self.json["meshes"][number]["primitives"][k]["attributes"];
+            let to = &mut self.new.json["meshes"][number]["primitives"][k]["attributes"];
             for (name, accessor) in ["_IRRADIANCE", "COLOR_0"].into_iter().zip(accessors) {
                 if let Some(accessor) = accessor {
                     to[name] = json!(accessor);
                 }
             }
+            // For programs that take the light from the other attribute.
+            if !has_colours {
+                let primitive = &mut self.new.json["meshes"][number]["primitives"][k];
+                add_extras(primitive, json!({ "COLOR_0": "light" }));
+            }
         }
         self.known.entry(mesh).or_default().push(LitMesh { irradiance, number });
         number
-    }
-
-    /// The mesh of the source, without light.
-    fn document_mesh(&self, mesh: usize) -> Value {
-        let mut copy = self.json["meshes"][mesh].clone();
-        let primitives = copy["primitives"].as_array_mut().into_iter().flatten();
-        for (primitive, source) in primitives.zip(&self.document.meshes[mesh].primitives) {
-            if let Some(attributes) = primitive["attributes"].as_object_mut() {
-                attributes.shift_remove("_IRRADIANCE");
-                if source.attributes.colour.is_none() {
-                    attributes.shift_remove("COLOR_0");
-                }
-            }
-        }
-        copy
     }
 
     /// Adds irradiance and, unless there are colours, the colours that show it: their accessors.
@@ -295,28 +279,13 @@ impl Writer<'_, '_> {
     }
 
     fn add_accessor(&mut self, vectors: Vec<[f32; 3]>) -> usize {
-        let (offset, count) = (self.binary.len(), vectors.len());
-        self.binary.extend(vectors.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-        let (buffer, before) = self.buffer;
-        let view = json!({
-            "buffer": buffer, "byteOffset": before + offset, "byteLength": 12 * count,
-            "byteStride": 12, "target": 34962,
+        let bytes: Vec<u8> = vectors.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+        let view = self.new.view(&bytes, Some(12), Some(ARRAY_BUFFER));
+        let accessor = json!({
+            "bufferView": view, "componentType": 5126, "count": vectors.len(), "type": "VEC3",
         });
-        let view = push(&mut self.json, "bufferViews", view);
-        let accessor =
-            json!({ "bufferView": view, "componentType": 5126, "count": count, "type": "VEC3" });
-        push(&mut self.json, "accessors", accessor)
+        self.new.push("accessors", accessor)
     }
-}
-
-/// Adds an item to a list of a document: its number.
-fn push(json: &mut Value, list: &str, item: Value) -> usize {
-    if !json[list].is_array() {
-        json[list] = json!([]);
-    }
-    let list = json[list].as_array_mut().expect("it was made one");
-    list.push(item);
-    list.len() - 1
 }
 
 /// From normals of a mesh to those of the world, up to their length.

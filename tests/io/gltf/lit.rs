@@ -16,7 +16,7 @@ fn baked(path: &Path) -> GatheredMesh {
 }
 
 /// The document of a file, and its binary chunk.
-fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
+pub fn parts(bytes: &[u8]) -> (Value, Vec<u8>) {
     if !bytes.starts_with(b"glTF") {
         return (serde_json::from_slice(bytes).unwrap(), vec![]);
     }
@@ -78,11 +78,17 @@ fn check_rest(source: &Gltf, json: &Value, binary: &[u8]) {
         rest[list].as_array_mut().unwrap().truncate(count);
     }
     for primitive in rest["meshes"].as_array_mut().unwrap().iter_mut() {
-        let attributes = primitive["primitives"][0]["attributes"].as_object_mut().unwrap();
+        let primitive = primitive["primitives"][0].as_object_mut().unwrap();
+        let extras = primitive.remove("extras");
+        let attributes = primitive["attributes"].as_object_mut().unwrap();
         attributes.remove("_IRRADIANCE");
-        if source.json["meshes"][0]["primitives"][0]["attributes"].get("COLOR_0").is_none() {
+        let has_colours =
+            source.json["meshes"][0]["primitives"][0]["attributes"].get("COLOR_0").is_some();
+        if !has_colours {
             attributes.remove("COLOR_0");
         }
+        let of_light = json!({ "radiosity": { "COLOR_0": "light" } });
+        assert_eq!(extras, (!has_colours).then_some(of_light));
     }
     rest["buffers"] = json!([{ "byteLength": source.binary.len() }]);
     for node in 0..3 {

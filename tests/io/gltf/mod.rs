@@ -4,6 +4,8 @@ mod cornell_box;
 mod geometry;
 mod lights;
 mod lit;
+#[cfg(feature = "light-map")]
+mod mapped;
 mod materials;
 mod refused;
 #[cfg(feature = "textures")]

@@ -1,5 +1,5 @@
-//! A scene with its light map in bevy: `cargo run --release -- room.light-map.glb room.light-map.ktx2`, of
-//! `radiosity light-map room.glb --write glb,ktx2`.
+//! A scene with its light map in bevy: `cargo run --release -- room.light-map.glb
+//! room.light-map.ktx2`, of `radiosity light-map room.glb --write glb,ktx2 --bind none`.
 //!
 //! Materials reflect the irradiance of the map; the file shows it as colours, for programs without
 //! light maps, and says beside them what surfaces are.

@@ -17,8 +17,8 @@ pub(super) struct Vertex {
     /// Relative to the origin, scene unit.
     pub position: Vec3,
     pub normal: Vec3,
-    /// Texture coordinates in the page of the map and in the scene's file, v downwards; the latter not finite
-    /// where it has none.
+    /// Texture coordinates in the page of the map and in the scene's file, v downwards; the latter
+    /// not finite where it has none.
     pub place: [f32; 2],
     pub given: [f32; 2],
 }
@@ -34,7 +34,8 @@ impl Vertex {
     }
 }
 
-/// The triangles of one group, one material and one page of the map, with textures that they are shown with or without.
+/// The triangles of one group, one material and one page of the map, with textures that they are
+/// shown with or without.
 pub(super) struct Primitive<'a> {
     pub group: u32,
     pub material: u32,
