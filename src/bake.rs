@@ -55,3 +55,4 @@ pub use progress::BakeProgress;
 pub use result::BakeResult;
 pub use settings::{BakeSettings, GatherSettings, SolveSettings};
 pub use target::BakeTarget;
+pub(crate) use to_error::check_error;

@@ -15,7 +15,7 @@ use glam::DVec3;
 use rustc_hash::FxHashSet;
 
 use crate::backend::{Backend, GatherRays};
-use crate::bake::{BakeResult, BakeSettings, ErrorEstimate, Obstacle, Outcome};
+use crate::bake::{BakeResult, BakeSettings, ErrorEstimate, Obstacle, Outcome, check_error};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::gather::kept_mesh::KeptVertices;
@@ -63,14 +63,17 @@ impl BakeResult {
         backend: &Backend,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<BakeResult>, Error> {
+        check_error(error)?;
         let start = Instant::now();
         let mesh = Mesh::new(lit_sides::resolved(scene.into()), f64::INFINITY)?;
         let settings = BakeSettings::for_error(error, mesh.scene());
         let floor = self.settings.measure.floor;
-        let gather = settings.gather.as_ref().expect("a bake to an error gathers");
+        // Those of a bake to this error.
+        let gather = settings.gather.as_ref();
+        let (rays, noise) = gather.map_or((1024, error), |g| (g.rays, g.noise_tolerance));
         let rays = GatherRays {
-            rays: gather.rays,
-            noise: gather.noise_tolerance,
+            rays,
+            noise,
             dim: self.light.radiosity_field().radiosity_floor(floor),
             near_field: true,
         };

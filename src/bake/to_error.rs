@@ -13,7 +13,7 @@ use crate::scene::Scene;
 
 /// # Errors
 /// [`ErrorKind::Setting`] for an error outside (0, 1).
-pub(super) fn check_error(error: f64) -> Result<(), Error> {
+pub(crate) fn check_error(error: f64) -> Result<(), Error> {
     if error > 0.0 && error < 1.0 {
         return Ok(());
     }

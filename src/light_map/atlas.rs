@@ -74,7 +74,7 @@ impl Atlas {
     ) -> Result<Atlas, Error> {
         settings.check()?;
         let scene = lit_sides::resolved(scene.into());
-        let (layout, groups, unusable) = layout_by_maps(&scene, settings)?;
+        let LayoutOfMaps { layout, groups, unusable } = layout_by_maps(&scene, settings)?;
         let Layout { sizes, maps: page_of, mut coordinates, charts } = layout;
         let (pages, size) = arranged(&sizes, &groups);
         if u64::from(size[0]) * u64::from(size[1]) > u64::from(MAX_SIDE).pow(2) {
@@ -186,19 +186,24 @@ impl Atlas {
     }
 }
 
-/// The layout of the triangles of `scene`, the group of each of its maps, and why the coordinates
-/// of the file are not used, if they were to be.
-fn layout_by_maps(
-    scene: &Scene,
-    settings: &LayoutSettings,
-) -> Result<(Layout, Vec<Option<u32>>, Option<Unusable>), Error> {
+/// The layout of all triangles of a scene.
+struct LayoutOfMaps {
+    layout: Layout,
+    /// The group of each map, where each has one.
+    groups: Vec<Option<u32>>,
+    /// Why the coordinates of the file are not used, if they were to be.
+    unusable: Option<Unusable>,
+}
+
+/// The layout of the triangles of `scene`, in as many maps as `settings` ask for.
+fn layout_by_maps(scene: &Scene, settings: &LayoutSettings) -> Result<LayoutOfMaps, Error> {
     let count = scene.triangles().len();
     let surfaces = SurfaceTopology::of_scene(scene).surfaces();
     if settings.maps != Maps::EachGroup {
         let all: Vec<u32> = (0..count as u32).collect();
         let (layout, unusable) = layout_of(scene, &all, &surfaces, settings)?;
         let groups = vec![None; layout.sizes.len()];
-        return Ok((layout, groups, unusable));
+        return Ok(LayoutOfMaps { layout, groups, unusable });
     }
     let mut by_group: Vec<Vec<u32>> = vec![vec![]; scene.groups().len()];
     for (t, triangle) in (0..).zip(scene.triangles()) {
@@ -222,7 +227,7 @@ fn layout_by_maps(
         groups.push(Some(group));
         first_unusable = first_unusable.or(unusable);
     }
-    Ok((all, groups, first_unusable))
+    Ok(LayoutOfMaps { layout: all, groups, unusable: first_unusable })
 }
 
 /// The layout of `triangles` of `scene`, which have these smooth `surfaces`.

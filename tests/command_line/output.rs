@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use radiosity::glam::DVec3;
+
 use crate::{lit_plates, refused, run, texts, write};
 
 /// Runs a quick `command` on the scene of two plates in `folder`, with this `--out`; gives the
@@ -78,7 +80,7 @@ fn a_kept_mesh_has_the_vertices_of_the_file_in_their_order() {
     assert!(out.status.success(), "{said}{told}");
     assert!(told.contains("2 vertices are shared by surfaces that meet in a crease"), "{told}");
     let ply = radiosity::read_ply(folder.path().join("lit.ply")).unwrap();
-    let positions: Vec<[f64; 3]> = ply.positions.iter().map(|p| p.to_array()).collect();
+    let positions: Vec<[f64; 3]> = ply.positions.iter().map(DVec3::to_array).collect();
     let of_file = [[9., 9., 9.], [0., 0., 0.], [1., 0., 0.], [0., 0., -1.], [0., 1., 0.]];
     assert_eq!(positions, of_file);
     let report = std::fs::read_to_string(folder.path().join("lit.json")).unwrap();
