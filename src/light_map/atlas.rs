@@ -5,25 +5,15 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::given_coordinates::{self, Unusable};
-use super::layout::{Layout, LayoutSettings, MAX_SIDE, Resolution, bad_size, in_texels};
+use super::layout::{
+    Coordinates, Layout, LayoutSettings, MAX_SIDE, Resolution, bad_size, in_texels,
+};
 use super::pages::{Maps, Page, arranged};
 use super::unwrapping;
 use crate::error::{Error, ErrorKind};
 use crate::mesh::SurfaceTopology;
 use crate::scene::Scene;
 use crate::visibility::lit_sides;
-
-/// Source of the texture coordinates of a light map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coordinates {
-    /// Those of the scene's file if they are usable for a light map, else new ones.
-    #[default]
-    Auto,
-    /// Those of the scene's file.
-    Given,
-    /// New ones.
-    Unwrapped,
-}
 
 /// Texture coordinates of all triangles of a scene, without overlap: in one texture, in which its
 /// [pages](Atlas::pages) lie side by side if there are several maps.

@@ -2,9 +2,20 @@
 
 use glam::DVec2;
 
-use super::atlas::Coordinates;
 use super::pages::Maps;
 use crate::error::{Error, ErrorKind};
+
+/// Source of the texture coordinates of a light map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Those of the scene's file if they are usable for a light map, else new ones.
+    #[default]
+    Auto,
+    /// Those of the scene's file.
+    Given,
+    /// New ones.
+    Unwrapped,
+}
 
 /// How the surfaces of a scene are laid out in light maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
