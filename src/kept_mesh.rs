@@ -26,10 +26,10 @@ use crate::vertex::VertexMesh;
 use crate::visibility::lit_sides;
 
 /// How many times further off than light at the vertices that of the bake may be: each vertex
-/// averages its errors over a hemisphere, and what is left takes paths. A room of 1 576 vertices to
-/// 5 % takes 13, 14, 8 and 4 s with 1, 1.5, 2 and 3, and a hall of 77 764 takes 82, 49, 71 and more
-/// than 200 s (two cores).
-const LOOSER: f64 = 2.0;
+/// averages its errors over a hemisphere, and what is left takes paths, whose number scatters much.
+/// A room of 1 576 vertices to 5 % takes 13, 14, 8 and 4 s with 1, 1.5, 2 and 3; one of 3 786 takes
+/// 13, 11, more than 100 and 4; a hall of 77 764 takes 82, 49, 71 and more than 200 (two cores).
+const LOOSER: f64 = 1.5;
 
 /// Largest error of the bake: light that is missed altogether is not averaged.
 const LOOSEST: f64 = 0.3;
