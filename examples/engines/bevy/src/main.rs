@@ -7,6 +7,7 @@
 use std::f32::consts::PI;
 use std::path::PathBuf;
 
+use bevy::camera::Exposure;
 use bevy::gltf::GltfMaterialExtras;
 use bevy::pbr::Lightmap;
 use bevy::prelude::*;
@@ -66,8 +67,8 @@ fn light(
         material.emissive = LinearRgba::rgb(x, y, z);
         material.perceptual_roughness = 1.0;
         material.reflectance = 0.0;
-        // bevy multiplies light maps by this and the camera's exposure, and reflects them over pi.
-        material.lightmap_exposure = 1.0 / Exposure::default().exposure();
+        // bevy shows a light map times the colour, this and the camera's exposure.
+        material.lightmap_exposure = 1.0 / (PI * Exposure::default().exposure());
     }
 }
 
