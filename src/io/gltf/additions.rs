@@ -84,3 +84,10 @@ pub(super) fn add_extras(object: &mut Value, about: Value) {
         extras.insert("radiosity".into(), about);
     }
 }
+
+/// Whether `mesh` is also of nodes that are not written anew: instances, and those that are not in
+/// the scene, as `is_placed` says of each.
+pub(super) fn has_other_users(document: &Document, is_placed: &[bool], mesh: usize) -> bool {
+    let users = document.nodes.iter().zip(is_placed).filter(|(node, _)| node.mesh == Some(mesh));
+    users.into_iter().any(|(node, is_placed)| !is_placed || node.extensions.instances.is_some())
+}

@@ -416,3 +416,8 @@ pub(super) fn check_number(triangles: usize) -> Result<(), Fault> {
     let found = format!("{triangles} triangles, each mesh as often as nodes have it");
     Err(Fault::new(found, format!("give at most {MAX_TRIANGLES}")))
 }
+
+/// The bits of a point; those of 0 for both zeros.
+pub(super) fn bits(p: DVec3) -> [u64; 3] {
+    (p + 0.0).to_array().map(f64::to_bits)
+}

@@ -14,11 +14,11 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use serde_json::{Value, json};
 
 use super::accessors::Values;
-use super::additions::{ARRAY_BUFFER, Additions, add_extras};
+use super::additions::{ARRAY_BUFFER, Additions, add_extras, has_other_users};
 use super::container::{Buffers, Container};
 use super::document::Document;
 use super::fault::Fault;
-use super::geometry::{Geometry, Group, MeshReader};
+use super::geometry::{Geometry, Group, MeshReader, bits};
 use super::materials;
 use super::nodes::Nodes;
 use crate::error::Error;
@@ -104,11 +104,6 @@ struct AtPoint {
 
 /// Light of a bake, by group and point.
 struct LightOfGroups(FxHashMap<(u32, [u64; 3]), Vec<AtPoint>>);
-
-/// The bits of a point; those of 0 for both zeros.
-fn bits(p: DVec3) -> [u64; 3] {
-    (p + 0.0).to_array().map(f64::to_bits)
-}
 
 impl LightOfGroups {
     fn new(light: &GatheredMesh) -> LightOfGroups {
@@ -228,10 +223,7 @@ impl Writer<'_, '_> {
     /// Adds a mesh like `mesh` of the source with this light, or adds it to that mesh, if all nodes
     /// that have it are lit and it is the first: its number.
     fn add_mesh(&mut self, mesh: usize, irradiance: Vec<Vec<Rgb>>) -> usize {
-        let users = self.document.nodes.iter().enumerate().filter(|(_, n)| n.mesh == Some(mesh));
-        let is_shared = users
-            .into_iter()
-            .any(|(k, node)| !self.is_placed[k] || node.extensions.instances.is_some());
+        let is_shared = has_other_users(self.document, &self.is_placed, mesh);
         let number = if self.known.contains_key(&mesh) || is_shared {
             let copy = self.new.source["meshes"][mesh].clone();
             self.new.push("meshes", copy)

@@ -13,11 +13,13 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use serde_json::{Value, json};
 
 use super::accessors::Values;
-use super::additions::{ARRAY_BUFFER, Additions, ELEMENT_ARRAY_BUFFER, add_extras};
+use super::additions::{
+    ARRAY_BUFFER, Additions, ELEMENT_ARRAY_BUFFER, add_extras, has_other_users,
+};
 use super::container::{Buffers, Container};
 use super::document::{Document, Primitive};
 use super::fault::Fault;
-use super::geometry::{Geometry, Group, MeshReader, check_number, triangles_of};
+use super::geometry::{Geometry, Group, MeshReader, bits, check_number, triangles_of};
 use super::materials;
 use super::nodes::Nodes;
 use crate::error::Error;
@@ -104,11 +106,6 @@ pub fn write_mapped_gltf(
 
 /// Three corners in any order, and the group of their triangle.
 type Corners = (u32, [[u64; 3]; 3]);
-
-/// The bits of a point; those of 0 for both zeros.
-fn bits(p: DVec3) -> [u64; 3] {
-    (p + 0.0).to_array().map(f64::to_bits)
-}
 
 fn corners_of(group: u32, corners: [DVec3; 3]) -> Corners {
     let mut points = corners.map(bits);
@@ -218,10 +215,7 @@ impl Writer<'_, '_> {
                 }
             }
         }
-        let users = self.document.nodes.iter().enumerate().filter(|(_, n)| n.mesh == Some(mesh));
-        let is_shared = users
-            .into_iter()
-            .any(|(k, node)| !self.is_placed[k] || node.extensions.instances.is_some());
+        let is_shared = has_other_users(self.document, &self.is_placed, mesh);
         if self.used.insert(mesh) && !is_shared {
             self.new.json["meshes"][mesh]["primitives"] = json!(primitives);
         } else {
