@@ -36,7 +36,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind};
-use crate::scene::{Material, Rgb, Scene, longest_edge};
+use crate::scene::{Facets, Material, Rgb, Scene, longest_edge};
 pub(crate) use clusters::Clusters;
 pub(crate) use contact_cuts::cut_at_contacts;
 pub(crate) use large_triangles::cut_large_triangles;
@@ -73,20 +73,62 @@ impl Node {
 #[derive(Clone, Debug)]
 pub struct Mesh {
     scene: Arc<Scene>,
-    nodes: Vec<Node>,
-    /// Node of each element.
-    elements: Vec<NodeId>,
-    /// Deepest level in each triangle.
-    depths: Vec<u32>,
-    /// Unit normal and area of each triangle.
-    normals: Arc<[DVec3]>,
-    areas: Arc<[f64]>,
+    trees: Arc<Quadtrees>,
+    facets: Arc<Facets>,
     /// Built on first use.
     clusters: Arc<OnceLock<Clusters>>,
     /// See [`Mesh::reflectance`]; empty without textures. Built on first use.
     textured_reflectances: Arc<OnceLock<Vec<Rgb>>>,
     /// See [`Mesh::solid_area`]; empty without holes. Built on first use.
     solid_shares: Arc<OnceLock<Vec<f64>>>,
+}
+
+/// The quadtrees on all triangles of a scene.
+#[derive(Clone, Debug)]
+struct Quadtrees {
+    /// The roots, one a triangle, before all others.
+    nodes: Vec<Node>,
+    /// Node of each element.
+    elements: Vec<NodeId>,
+    /// Deepest level in each triangle.
+    depths: Vec<u32>,
+}
+
+impl Quadtrees {
+    /// The roots alone, without elements, for so many triangles.
+    fn of_roots(triangles: usize) -> Quadtrees {
+        Quadtrees {
+            nodes: (0..triangles as u32).map(|t| Node::leaf(t, Cell::ROOT)).collect(),
+            elements: Vec::with_capacity(triangles),
+            depths: vec![0; triangles],
+        }
+    }
+
+    /// Builds the subtree of node `n`, and numbers its elements. `children_of` returns the data
+    /// known of a node's children, given the node and its own data; none if it has no children.
+    fn build_subtree<T: Copy>(
+        &mut self,
+        n: usize,
+        known: T,
+        children_of: &impl Fn(&Node, T) -> Option<[T; 4]>,
+    ) {
+        let Node { triangle, cell, .. } = self.nodes[n];
+        let first_element = self.elements.len() as u32;
+        self.nodes[n].first_element = first_element;
+        if let Some(known) = children_of(&self.nodes[n], known) {
+            let children = self.nodes.len();
+            self.nodes[n].children = children as u32;
+            self.nodes.extend(cell.children().map(|child| Node::leaf(triangle, child)));
+            for (child, known) in (children..).zip(known) {
+                self.build_subtree(child, known, children_of);
+            }
+        } else {
+            let depth = &mut self.depths[triangle as usize];
+            *depth = cell.level.max(*depth);
+            self.elements.push(NodeId(n as u32));
+        }
+        self.nodes[n].element_count = self.elements.len() as u32 - first_element;
+    }
 }
 
 impl Mesh {
@@ -149,36 +191,25 @@ impl Mesh {
         Ok(Mesh::refined_where(scene, |t, cell| cell.level < depths[t]))
     }
 
-    /// The roots alone, without elements, normals and areas.
-    fn of_roots(scene: Arc<Scene>) -> Mesh {
-        let count = scene.triangles().len();
-        Mesh {
-            scene,
-            nodes: (0..count as u32).map(|t| Node::leaf(t, Cell::ROOT)).collect(),
-            elements: vec![],
-            depths: vec![0; count],
-            normals: Arc::default(),
-            areas: Arc::default(),
-            clusters: Arc::default(),
-            textured_reflectances: Arc::default(),
-            solid_shares: Arc::default(),
-        }
-    }
-
     /// Splits every triangle as long as `is_inner` returns true for the triangle and a cell of it.
     fn refined_where(scene: Arc<Scene>, is_inner: impl Fn(usize, Cell) -> bool) -> Mesh {
         let count = scene.triangles().len();
-        let mut mesh = Mesh {
-            normals: (0..count).map(|t| scene.normal(t)).collect(),
-            areas: (0..count).map(|t| scene.area(t)).collect(),
-            ..Mesh::of_roots(scene)
-        };
+        let mut trees = Quadtrees::of_roots(count);
         for root in 0..count {
-            mesh.build_subtree(root, (), &|node, ()| {
+            trees.build_subtree(root, (), &|node, ()| {
                 is_inner(node.triangle as usize, node.cell).then_some([(); 4])
             });
         }
-        mesh
+        trees.nodes.shrink_to_fit();
+        trees.elements.shrink_to_fit();
+        Mesh {
+            trees: Arc::new(trees),
+            facets: scene.facets(),
+            clusters: Arc::default(),
+            textured_reflectances: Arc::default(),
+            solid_shares: Arc::default(),
+            scene,
+        }
     }
 
     /// The same scene with each of `elements` split into four more.
@@ -187,6 +218,9 @@ impl Mesh {
     /// [`ErrorKind::Setting`] when one of them is [`Mesh::MAX_DEPTH`] levels deep, or when there
     /// would be more than [`Mesh::MAX_ELEMENTS`].
     pub fn split(&self, elements: &[usize]) -> Result<Mesh, Error> {
+        if elements.is_empty() {
+            return Ok(self.clone());
+        }
         let wanted = self.element_count() + 3 * elements.len();
         let deep = |&&e: &&usize| self.cell(self.element(e)).level >= Mesh::MAX_DEPTH;
         if wanted > Mesh::MAX_ELEMENTS || elements.iter().any(|e| deep(&e)) {
@@ -198,51 +232,26 @@ impl Mesh {
         }
         let mut is_split = vec![false; self.element_count()];
         elements.iter().for_each(|&e| is_split[e] = true);
-        let mut split = Mesh {
-            normals: self.normals.clone(),
-            areas: self.areas.clone(),
-            clusters: self.clusters.clone(),
-            ..Mesh::of_roots(self.scene.clone())
-        };
-        split.nodes.reserve(4 * elements.len() + self.nodes.len());
-        split.elements.reserve(wanted);
-        for root in 0..self.depths.len() {
+        let triangles = self.trees.depths.len();
+        let mut split = Quadtrees::of_roots(triangles);
+        split.nodes.reserve_exact(4 * elements.len() + self.trees.nodes.len() - triangles);
+        split.elements.reserve_exact(wanted);
+        for root in 0..triangles {
             // A cell of the old mesh is split as it was, or if requested; a new one is not.
             split.build_subtree(root, Some(root), &|_, old: Option<usize>| {
-                let Node { children, first_element, .. } = self.nodes[old?];
+                let Node { children, first_element, .. } = self.trees.nodes[old?];
                 if children != LEAF {
                     return Some([0, 1, 2, 3].map(|k| Some(children as usize + k)));
                 }
                 is_split[first_element as usize].then_some([None; 4])
             });
         }
-        Ok(split)
-    }
-
-    /// Builds the subtree of node `n`, and numbers its elements. `children_of` returns the data
-    /// known of a node's children, given the node and its own data; none if it has no children.
-    fn build_subtree<T: Copy>(
-        &mut self,
-        n: usize,
-        known: T,
-        children_of: &impl Fn(&Node, T) -> Option<[T; 4]>,
-    ) {
-        let Node { triangle, cell, .. } = self.nodes[n];
-        let first_element = self.elements.len() as u32;
-        self.nodes[n].first_element = first_element;
-        if let Some(known) = children_of(&self.nodes[n], known) {
-            let children = self.nodes.len();
-            self.nodes[n].children = children as u32;
-            self.nodes.extend(cell.children().map(|child| Node::leaf(triangle, child)));
-            for (child, known) in (children..).zip(known) {
-                self.build_subtree(child, known, children_of);
-            }
-        } else {
-            let depth = &mut self.depths[triangle as usize];
-            *depth = cell.level.max(*depth);
-            self.elements.push(NodeId(n as u32));
-        }
-        self.nodes[n].element_count = self.elements.len() as u32 - first_element;
+        Ok(Mesh {
+            trees: Arc::new(split),
+            textured_reflectances: Arc::default(),
+            solid_shares: Arc::default(),
+            ..self.clone()
+        })
     }
 
     /// The same elements in another `scene`: one whose materials, or positions of triangles, have
@@ -259,10 +268,9 @@ impl Mesh {
             return Err(Error::new(ErrorKind::Scene, "changed scene", found, remedy));
         }
         self.clusters();
-        let normals = (0..count).map(|t| scene.normal(t)).collect();
-        let areas = (0..count).map(|t| scene.area(t)).collect();
+        let facets = scene.facets();
         let (textured_reflectances, solid_shares) = (Arc::default(), Arc::default());
-        Ok(Mesh { scene, normals, areas, textured_reflectances, solid_shares, ..self.clone() })
+        Ok(Mesh { scene, facets, textured_reflectances, solid_shares, ..self.clone() })
     }
 
     /// Clusters of triangles.
@@ -273,8 +281,8 @@ impl Mesh {
     /// Whether elements of `other` have the same positions in the same triangles.
     pub(crate) fn has_elements_of(&self, other: &Mesh) -> bool {
         let places = |mesh: &Mesh, e: usize| {
-            let node = mesh.node(mesh.elements[e]);
-            (mesh.elements[e], node.triangle, node.cell)
+            let node = mesh.node(mesh.element(e));
+            (mesh.element(e), node.triangle, node.cell)
         };
         let count = self.element_count();
         count == other.element_count() && (0..count).all(|e| places(self, e) == places(other, e))
@@ -282,7 +290,7 @@ impl Mesh {
 
     /// Whether `node` is one of this mesh.
     pub(crate) fn contains(&self, node: NodeId) -> bool {
-        (node.0 as usize) < self.nodes.len()
+        (node.0 as usize) < self.trees.nodes.len()
     }
 
     /// The scene of the mesh.
@@ -296,17 +304,17 @@ impl Mesh {
 
     /// Number of nodes of all quadtrees.
     pub(crate) fn node_count(&self) -> usize {
-        self.nodes.len()
+        self.trees.nodes.len()
     }
 
     /// Number of elements.
     pub fn element_count(&self) -> usize {
-        self.elements.len()
+        self.trees.elements.len()
     }
 
     /// The quadtree leaf that is element `e`.
     pub fn element(&self, e: usize) -> NodeId {
-        self.elements[e]
+        self.trees.elements[e]
     }
 
     /// The elements below `node`, as one range.
@@ -317,7 +325,7 @@ impl Mesh {
 
     /// The root of triangle `t`'s quadtree.
     pub fn root(&self, t: usize) -> NodeId {
-        debug_assert!(t < self.depths.len());
+        debug_assert!(t < self.trees.depths.len());
         NodeId(t as u32)
     }
 
@@ -335,7 +343,7 @@ impl Mesh {
 
     /// Index of `node` among the four parts of its parent; none for a root.
     pub(crate) fn place_in_parent(&self, node: NodeId) -> Option<usize> {
-        node.0.checked_sub(self.depths.len() as u32).map(|k| (k % 4) as usize)
+        node.0.checked_sub(self.trees.depths.len() as u32).map(|k| (k % 4) as usize)
     }
 
     /// The element at corner `k` of `node`, whose own corner `k` it is.
@@ -355,12 +363,12 @@ impl Mesh {
     /// Area of `node`, holes included, length unit squared.
     pub fn area(&self, node: NodeId) -> f64 {
         let n = self.node(node);
-        self.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
+        self.facets.areas[n.triangle as usize] / f64::from(1u32 << (2 * n.cell.level))
     }
 
     /// Area of all elements that scatter light, length unit squared.
     pub(crate) fn scattering_area(&self) -> f64 {
-        let elements = self.elements.iter().filter(|&&node| self.material(node).scatters());
+        let elements = self.trees.elements.iter().filter(|&&node| self.material(node).scatters());
         elements.map(|&node| self.solid_area(node)).sum()
     }
 
@@ -369,12 +377,12 @@ impl Mesh {
     pub(crate) fn mean_albedo(&self) -> Rgb {
         let scattering = |(e, &node): (usize, &NodeId)| self.albedo(e) * self.solid_area(node);
         let area = self.scattering_area().max(f64::MIN_POSITIVE);
-        self.elements.iter().enumerate().map(scattering).sum::<Rgb>() / area
+        self.trees.elements.iter().enumerate().map(scattering).sum::<Rgb>() / area
     }
 
     /// Unit normal of `node`, on its front.
     pub fn normal(&self, node: NodeId) -> DVec3 {
-        self.normals[self.triangle(node)]
+        self.facets.normals[self.triangle(node)]
     }
 
     /// Corners of `node`, counter-clockwise from the front.
@@ -431,7 +439,7 @@ impl Mesh {
 
     /// Deepest level of triangle `t`'s quadtree.
     pub(crate) fn depth(&self, t: usize) -> u32 {
-        self.depths[t]
+        self.trees.depths[t]
     }
 
     /// The cell of `node` in its triangle.
@@ -440,7 +448,7 @@ impl Mesh {
     }
 
     fn node(&self, id: NodeId) -> &Node {
-        &self.nodes[id.0 as usize]
+        &self.trees.nodes[id.0 as usize]
     }
 }
 

@@ -122,6 +122,15 @@ struct Shape {
     derived: Derived,
 }
 
+/// What the plane of each triangle is.
+#[derive(Debug)]
+pub(crate) struct Facets {
+    /// [`Scene::normal`]
+    pub normals: Vec<DVec3>,
+    /// [`Scene::area`]
+    pub areas: Vec<f64>,
+}
+
 /// Corners of all triangles by position numbers, equal positions having one number.
 #[derive(Debug)]
 pub(crate) struct WeldedCorners {
@@ -284,6 +293,15 @@ impl Scene {
     pub fn area(&self, t: usize) -> f64 {
         let [a, b, c] = self.corners(t);
         0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Normals and areas of all triangles; computed once.
+    pub(crate) fn facets(&self) -> Arc<Facets> {
+        self.derived_from_shape(|scene| {
+            let all = 0..scene.triangles.len();
+            let normals = all.clone().map(|t| scene.normal(t)).collect();
+            Facets { normals, areas: all.map(|t| scene.area(t)).collect() }
+        })
     }
 
     /// Area of all triangles, scene unit squared.

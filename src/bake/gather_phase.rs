@@ -54,7 +54,7 @@ pub(super) struct GatherPhase<'a> {
     gather: GatherSettings,
     measure: Measure,
     target: Option<ErrorTarget<'a>>,
-    state: AdaptiveGather<'a>,
+    state: AdaptiveGather,
     gatherer: Box<dyn Gather + 'a>,
     backend: &'a ResilientBackend<'a>,
     shot: &'a ShotLight,
@@ -88,12 +88,13 @@ impl<'a> GatherPhase<'a> {
         gather: &GatherSettings,
         target: Option<ErrorTarget<'a>>,
         mesh: Mesh,
-        light: &'a GatheredMesh,
+        light: &GatheredMesh,
         shot: &'a ShotLight,
         backend: &'a ResilientBackend<'a>,
     ) -> Result<GatherPhase<'a>, Error> {
         let (solve, gather, measure) = (settings.solve.clone(), gather.clone(), settings.measure);
-        let state = AdaptiveGather::new(mesh, light, gather.refinement.region, measure);
+        let state =
+            AdaptiveGather::new(mesh, &light.radiosity_field(), gather.refinement.region, measure);
         let gatherer = backend.gather(
             &shot.mesh,
             gather.rays,

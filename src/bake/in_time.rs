@@ -42,7 +42,7 @@ const SECONDS_PER_CONTACTS: f64 = 1e-5;
 pub(super) fn bake_in_time(
     limit: Duration,
     goal: Option<ErrorTarget>,
-    scene: &Arc<Scene>,
+    scene: Arc<Scene>,
     backend: &Backend,
     overrides: &dyn Fn(&mut BakeSettings),
     progress: ProgressCallback,
@@ -52,8 +52,8 @@ pub(super) fn bake_in_time(
     if goal.is_some() {
         check_error(least_error)?;
     }
+    let cutting = SECONDS_PER_CONTACTS * scene.triangles().len() as f64;
     let overrides = &|settings: &mut BakeSettings| {
-        let cutting = SECONDS_PER_CONTACTS * scene.triangles().len() as f64;
         if let Some(gather) = &mut settings.gather
             && cutting > SHARE_OF_CONTACTS * limit.as_secs_f64()
         {
@@ -71,7 +71,7 @@ pub(super) fn bake_in_time(
         is_over.set(cancelled.get() || Instant::now() >= gather_until);
         if is_over.get() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let settings = settings_for(&target, scene);
+    let settings = settings_for(&target, &scene);
     let baked = match &settings.gather {
         Some(_) => pipeline::run_without_shooting(&settings, scene, backend, target, until)?,
         None => pipeline::run(&settings, scene, backend, Some(target), until)?,

@@ -34,14 +34,14 @@ impl BakeSettings {
         backend: &Backend,
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
-        run(self, &lit_sides::resolved(scene.into()), backend, None, &mut progress)
+        run(self, lit_sides::resolved(scene.into()), backend, None, &mut progress)
     }
 }
 
 /// Bakes as far as `settings` go and, given a `target`, on until the estimated error meets it.
 pub(super) fn run(
     settings: &BakeSettings,
-    scene: &Arc<Scene>,
+    scene: Arc<Scene>,
     backend: &Backend,
     target: Option<ErrorTarget>,
     progress: ProgressCallback,
@@ -56,7 +56,7 @@ pub(super) fn run(
 /// shot, and triangles are cut along walls if elements are split there.
 pub(super) fn run_without_shooting(
     settings: &BakeSettings,
-    scene: &Arc<Scene>,
+    scene: Arc<Scene>,
     backend: &Backend,
     target: ErrorTarget,
     progress: ProgressCallback,
@@ -65,8 +65,8 @@ pub(super) fn run_without_shooting(
     let pipeline = Pipeline::new(settings, backend, Some(target), progress)?;
     let splits_at_contacts = |gather: &GatherSettings| gather.contact_levels > 0;
     let scene = match settings.gather.as_ref().is_some_and(splits_at_contacts) {
-        true => cut_scene(settings, scene, Some(target)),
-        false => with_creases(scene, model::crease_degrees(target.finest())),
+        true => cut_scene(settings, &scene, Some(target)),
+        false => with_creases(&scene, model::crease_degrees(target.finest())),
     };
     let sizing = settings.solve.sizing(&scene, settings.solve.element_size);
     let mesh = Mesh::sized(scene, &sizing, model::MAX_SHOOTING_DEPTH)?;
@@ -95,10 +95,11 @@ impl<'p> Pipeline<'p> {
     }
 
     /// Cuts `scene` and shoots its light.
-    fn shoot(&mut self, scene: &Arc<Scene>) -> Result<ShotLight, Error> {
+    fn shoot(&mut self, scene: Arc<Scene>) -> Result<ShotLight, Error> {
         let Pipeline { settings, backend, target, reporter, clock } = self;
-        let scene = &cut_scene(settings, scene, *target);
-        shooting_phase::shoot(&settings.solve, scene, backend, reporter, clock)
+        // The scene as it was is no longer needed, nor is its ray hierarchy.
+        let scene = cut_scene(settings, &scene, *target);
+        shooting_phase::shoot(&settings.solve, &scene, backend, reporter, clock)
     }
 
     /// Vertices gather what was `shot`.
@@ -109,8 +110,10 @@ impl<'p> Pipeline<'p> {
             Some(gather) if shot.solution.stop != StopReason::Cancelled => {
                 let scene = &shot.mesh.shared_scene();
                 let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
-                GatherPhase::new(settings, gather, target, mesh, &by_elements, &shot, backend)?
-                    .run(&mut reporter, &mut clock)?
+                let phase =
+                    GatherPhase::new(settings, gather, target, mesh, &by_elements, &shot, backend)?;
+                drop(by_elements);
+                phase.run(&mut reporter, &mut clock)?
             }
             _ => shooting_phase::estimate_elements(
                 &shot,

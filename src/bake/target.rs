@@ -105,8 +105,8 @@ impl BakeTarget {
         overrides: impl Fn(&mut BakeSettings),
         mut progress: impl FnMut(&BakeProgress) -> ControlFlow<()>,
     ) -> Result<BakeResult, Error> {
-        let scene = &lit_sides::resolved(scene.into());
-        check_light(scene)?;
+        let scene = lit_sides::resolved(scene.into());
+        check_light(&scene)?;
         match self {
             BakeTarget::Error(error) | BakeTarget::ErrorEach(error) => {
                 let each_group = matches!(self, BakeTarget::ErrorEach(_));

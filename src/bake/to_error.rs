@@ -27,12 +27,12 @@ pub(crate) fn check_error(error: f64) -> Result<(), Error> {
 /// Those of [`check_error`] and of the phases.
 pub(super) fn bake_to_error(
     target: ErrorTarget,
-    scene: &Arc<Scene>,
+    scene: Arc<Scene>,
     backend: &Backend,
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
     check_error(target.error)?;
-    pipeline::run(&settings_for(&target, scene), scene, backend, Some(target), progress)
+    pipeline::run(&settings_for(&target, &scene), scene, backend, Some(target), progress)
 }
 
 /// The settings that `target` begins with.

@@ -86,7 +86,8 @@ pub fn gather_at_vertices(
     source.check_scene(mesh)?;
     // The error of the settings is over all of the area.
     let measure = Measure { tail: 0.0, ..Measure::default() };
-    let mut state = AdaptiveGather::new(mesh.clone(), source, settings.region, measure);
+    let mut state =
+        AdaptiveGather::new(mesh.clone(), &source.radiosity_field(), settings.region, measure);
     let gatherers = Gatherers { last: gatherer, coarse: None, probes: None, bounces: None };
     let stop = state.run_passes(settings, gatherers, &mut progress)?;
     let result = if stop == StopReason::Cancelled {
@@ -99,9 +100,9 @@ pub fn gather_at_vertices(
 
 /// State of an adaptive gather, which can go on with other settings.
 #[derive(Clone)]
-pub(crate) struct AdaptiveGather<'a> {
+pub(crate) struct AdaptiveGather {
     /// The light that vertices gather.
-    source: SourceLight<'a>,
+    source: SourceLight,
     samples: SampledMesh,
     probes: CentroidProbes,
     /// Whose shadows have sharp edges.
@@ -121,22 +122,21 @@ pub(crate) struct AdaptiveGather<'a> {
     gather_count: u64,
 }
 
-impl<'a> AdaptiveGather<'a> {
+impl AdaptiveGather {
     /// Starts on `mesh` with the values that `source`, of the same scene, has at its vertices. Most
     /// of the light is in `region`.
     pub fn new(
         mesh: Mesh,
-        source: &'a GatheredMesh,
+        source: &RadiosityField,
         region: Option<Aabb>,
         measure: Measure,
-    ) -> AdaptiveGather<'a> {
-        let field = source.radiosity_field();
-        let scale = ErrorScale::new(&mesh, &field, region, measure);
+    ) -> AdaptiveGather {
+        let scale = ErrorScale::new(&mesh, source, region, measure);
         AdaptiveGather {
             probes: CentroidProbes::new(mesh.element_count()),
             directional_light: DirectionalLight::of_scene(mesh.shared_scene()).map(Arc::new),
-            samples: SampledMesh::new(mesh, &field),
-            source: SourceLight::new(field),
+            samples: SampledMesh::new(mesh, source),
+            source: SourceLight::new(*source),
             scale,
             relative_change: 0.0,
             pass: 0,
@@ -197,7 +197,7 @@ impl<'a> AdaptiveGather<'a> {
 
     /// What was reached so far.
     pub fn to_gathered_mesh(&self) -> GatheredMesh {
-        self.gathered_mesh_of(Cow::Borrowed(&self.samples))
+        self.gathered_mesh_of(self.samples.clone())
     }
 
     /// What was reached, with elements split onto the quadratic interpolant where it leaves them,
@@ -214,15 +214,14 @@ impl<'a> AdaptiveGather<'a> {
             None => Cow::Borrowed(&self.samples),
         };
         let refined = interpolated_refinement(&samples, &source, &self.scale, settings)?;
-        Ok((self.gathered_mesh_of(Cow::Owned(refined.samples)), refined.residual_error))
+        drop(samples);
+        Ok((self.gathered_mesh_of(refined.samples), refined.residual_error))
     }
 
-    fn gathered_mesh_of(&self, samples: Cow<SampledMesh>) -> GatheredMesh {
-        let (surface, reflected) = (samples.vertex_mesh(), mean_preserving(&samples));
-        let (mesh, corners) = match samples {
-            Cow::Borrowed(samples) => (samples.mesh.clone(), samples.corners().to_vec()),
-            Cow::Owned(samples) => (samples.mesh, samples.vertices.corners),
-        };
+    fn gathered_mesh_of(&self, samples: SampledMesh) -> GatheredMesh {
+        let mesh = samples.mesh.clone();
+        let reflected = mean_preserving(&samples);
+        let (surface, corners) = samples.into_vertex_mesh();
         GatheredMesh {
             mesh,
             surface,
@@ -440,7 +439,7 @@ impl<'a> AdaptiveGather<'a> {
             return all.filter(|&e| self.samples.is_splittable(e)).collect();
         }
         // Of the light that was shot: vertices may have missed some of it.
-        let shot = self.source.shot;
+        let shot = self.source.shot();
         let share_of = |(element, known): (usize, &mut Option<(usize, Share)>)| {
             if let &mut Some((pool, share)) = known {
                 return (pool, Share { element, ..share });
@@ -658,7 +657,8 @@ mod tests {
         let light = GatheredMesh::from_elements(&mesh, &radiosity).unwrap();
         let mut rays = RayGather::new(&mesh, 16).unwrap();
         let rows = RayGather::new(&mesh, 16).unwrap();
-        let mut state = AdaptiveGather::new(mesh, &light, None, Measure::default());
+        let mut state =
+            AdaptiveGather::new(mesh, &light.radiosity_field(), None, Measure::default());
         let gatherers =
             Gatherers { last: &mut rays, coarse: None, probes: None, bounces: Some(&rows) };
         let settings = RefinementSettings::new(1e9);
@@ -684,7 +684,8 @@ mod tests {
         let settings = RefinementSettings::new(1e9);
         let mut rays = RayGather::new(&mesh, 256).unwrap();
         let mut proceed = |_: &Progress| ControlFlow::Continue(());
-        let mut at_once = AdaptiveGather::new(mesh, &light, None, Measure::default());
+        let mut at_once =
+            AdaptiveGather::new(mesh, &light.radiosity_field(), None, Measure::default());
         at_once.gather_pass(&settings, &mut rays, None, &mut proceed).unwrap();
         let mut by_passes = at_once.clone();
         let first = at_once.samples.reflected.clone();

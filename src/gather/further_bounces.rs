@@ -41,13 +41,13 @@ impl GatheredFrom<'_> {
         let all = 0..vertices.positions.len() as u32;
         let gathering: Vec<u32> = all.filter(|&v| rows.albedo(v) != Rgb::ZERO).collect();
         let equation = |v: u32, row: &VertexRow| self.equation(&rows, v, row);
-        let of_gathering = rows.map(&gathering, 1, equation, progress)?;
-        let mut equations = vec![Equation::default(); vertices.positions.len()];
-        let count = gathering.len();
-        for (v, equation) in gathering.into_iter().zip(of_gathering) {
-            equations[v as usize] = equation;
+        let mut equations = rows.map(&gathering, 1, equation, progress)?;
+        equations.reserve_exact(vertices.positions.len() - gathering.len());
+        equations.resize_with(vertices.positions.len(), Equation::default);
+        for (k, &v) in gathering.iter().enumerate().rev() {
+            equations.swap(k, v as usize);
         }
-        Some((converge(&equations, floor), count))
+        Some((converge(&equations, floor), gathering.len()))
     }
 
     /// The equation of vertex `v`; darkness where it is buried.

@@ -15,6 +15,7 @@ use crate::error::Error;
 use crate::mesh::{Mesh, SurfaceTopology};
 use crate::progress::{BatchSizer, StopReason};
 use crate::scene::Rgb;
+use crate::vertex::VertexMesh;
 use crate::vertex::keys::Vertices;
 
 /// The vertices of a mesh, each with what it gathered.
@@ -170,13 +171,14 @@ impl KeptVertices {
             hidden: vec![false; count],
         };
         extrapolate_into_buried(&mut samples);
-        let mut surface = samples.vertex_mesh();
-        surface.error = samples.noise;
+        let (mesh, reflected) = (samples.mesh.clone(), samples.reflected.clone());
+        let error = samples.noise.clone();
+        let (surface, corners) = samples.into_vertex_mesh();
         GatheredMesh {
-            surface,
-            mesh: samples.mesh,
-            corners: samples.vertices.corners,
-            reflected: samples.reflected,
+            surface: VertexMesh { error, ..surface },
+            mesh,
+            corners,
+            reflected,
             gather_count: self.gather_count,
             relative_change: 0.0,
             stop: StopReason::Converged,

@@ -142,35 +142,39 @@ impl SampledMesh {
         if total > 0.0 { (difference / total).sqrt() } else { 0.0 }
     }
 
-    /// The surface with what its vertices emit and reflect, without cracks.
-    pub fn vertex_mesh(&self) -> VertexMesh {
-        let count = self.vertices.positions.len();
+    /// The surface with what its vertices emit and reflect, without cracks; and
+    /// [`SampledMesh::corners`].
+    pub fn into_vertex_mesh(self) -> (VertexMesh, Vec<[u32; 3]>) {
+        // All else is dropped here: the surface is as large.
+        let SampledMesh { mesh, topology, vertices, reflected, .. } = self;
+        let hanging_nodes = HangingNodes::new(&mesh, &topology, &vertices);
+        let Vertices { positions, corners, outlines, .. } = vertices;
+        let count = positions.len();
         let mut out = VertexMesh {
-            positions: self.vertices.positions.clone(),
+            positions,
             normals: vec![DVec3::ZERO; count],
             radiosity: vec![Rgb::ZERO; count],
-            sky: self.mesh.scene().sky().clone(),
+            sky: mesh.scene().sky().clone(),
             ..Default::default()
         };
-        for (e, outline) in self.vertices.outlines.iter() {
-            let node = self.mesh.element(e);
-            let emitted = self.mesh.material(node).exitance;
+        for (e, outline) in outlines.iter() {
+            let node = mesh.element(e);
+            let emitted = mesh.material(node).exitance;
             for v in outline.iter().map(|&v| v as usize) {
-                out.normals[v] += self.mesh.normal(node) * self.mesh.area(node);
-                out.radiosity[v] = emitted + self.reflected[v];
+                out.normals[v] += mesh.normal(node) * mesh.area(node);
+                out.radiosity[v] = emitted + reflected[v];
             }
         }
         for normal in &mut out.normals {
             *normal = normal.normalize_or_zero();
         }
-        out.reflect(&self.mesh, &self.vertices.outlines, &self.reflected);
-        let hanging_nodes = HangingNodes::new(&self.mesh, &self.topology, &self.vertices);
-        out.add_elements(&self.mesh, &hanging_nodes, |out, e| {
-            let corners = self.vertices.corners[e].map(|v| v as usize);
+        out.reflect(&mesh, &outlines, &reflected);
+        out.add_elements(&mesh, &hanging_nodes, |out, e| {
+            let corners = corners[e].map(|v| v as usize);
             [&out.radiosity, &out.irradiance]
                 .map(|values| corners.iter().map(|&v| values[v]).sum::<Rgb>() / 3.0)
         });
-        out
+        (out, corners)
     }
 }
 

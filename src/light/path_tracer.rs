@@ -27,7 +27,7 @@ use super::luminaires::Luminaires;
 use crate::progress::BatchSizer;
 use crate::sampling::octaves::Part;
 use crate::sampling::random::random_numbers;
-use crate::scene::{Material, Rgb, Scene, Sun};
+use crate::scene::{Facets, Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -60,7 +60,7 @@ pub struct PathTracer<'a> {
     scene: SceneRef<'a>,
     rays: Arc<RayScene>,
     panes: Panes,
-    normals: Vec<DVec3>,
+    facets: Arc<Facets>,
     emitters: Arc<Emitters>,
     luminaires: Arc<Luminaires>,
     /// Surfaces within this distance of each other are in one place, scene unit.
@@ -115,7 +115,7 @@ impl<'a> PathTracer<'a> {
         PathTracer {
             rays: RayScene::of_scene(&scene),
             panes: Panes::of_scene(&scene),
-            normals: (0..scene.triangles().len()).map(|t| scene.normal(t)).collect(),
+            facets: scene.facets(),
             emitters: scene.derived(Emitters::new),
             luminaires: scene.derived(|scene| Luminaires::new(scene.luminaires())),
             contact: offset::path_contact(&scene),
@@ -127,7 +127,8 @@ impl<'a> PathTracer<'a> {
     /// The point of the scene nearest to `position`, along `normal` (unit length), on a triangle
     /// that faces alike; none where there is none within 1e-4 of the scene's diagonal.
     pub fn locate(&self, position: DVec3, normal: DVec3) -> Option<SurfacePoint> {
-        let nearest = nearest_surfaces(&self.rays, &self.normals, position, normal, self.diagonal);
+        let nearest =
+            nearest_surfaces(&self.rays, &self.facets.normals, position, normal, self.diagonal);
         let hit = nearest.first()?;
         let [a, b, c] = self.scene.corners(hit.triangle);
         let position = a + hit.u * (b - a) + hit.v * (c - a);
@@ -207,7 +208,7 @@ impl<'a> PathTracer<'a> {
 
     /// What those of `rays` rays from `point`, dense as the cosine, meet that meet anything.
     pub(crate) fn hits(&self, point: &SurfacePoint, rays: usize, rng: &mut Rng) -> Vec<Hit> {
-        let normal = self.normals[point.triangle];
+        let normal = self.facets.normals[point.triangle];
         (0..rays).filter_map(|_| self.next_hit(point, cosine_weighted(normal, rng).0)).collect()
     }
 
@@ -323,7 +324,7 @@ impl<'a> PathTracer<'a> {
             let Some(reflected) = self.scatter_at(&mut at, &hit, rng) else { return };
             share *= reflected;
             visit(Visit::Surface { at, share }, rng);
-            direction = cosine_weighted(self.normals[at.triangle], rng).0;
+            direction = cosine_weighted(self.facets.normals[at.triangle], rng).0;
             (from, start, ignored) = (at.position, self.contact, Some(at.triangle));
         }
     }
@@ -370,7 +371,7 @@ impl<'a> PathTracer<'a> {
         if !self.scene.luminaires().is_empty() {
             *reflected += *throughput * self.irradiance_of_luminaire(at, rng);
         }
-        let (direction, cosine) = cosine_weighted(self.normals[at.triangle], rng);
+        let (direction, cosine) = cosine_weighted(self.facets.normals[at.triangle], rng);
         let Some(hit) = self.next_hit(at, direction) else {
             let passed = self.passed(at, direction, f64::INFINITY);
             *reflected += *throughput * passed * PI * self.scene.sky().radiance(direction);
@@ -383,7 +384,7 @@ impl<'a> PathTracer<'a> {
         let exitance = self.scene.exitance_at(hit.triangle, [hit.u, hit.v]);
         if exitance != Rgb::ZERO {
             let balance = weights.map_or(1.0, |weights| {
-                let facing = self.normals[hit.triangle].dot(direction).abs();
+                let facing = self.facets.normals[hit.triangle].dot(direction).abs();
                 let by_area = self.emitters.density(&weights, hit.triangle);
                 let light = by_area * hit.distance * hit.distance / facing;
                 cosine / PI / (cosine / PI + light)
@@ -405,7 +406,7 @@ impl<'a> PathTracer<'a> {
         let (mut at, mut throughput) = self.start(point, rng);
         let mut reflected = Rgb::ZERO;
         for bounce in 1.. {
-            let (direction, _) = cosine_weighted(self.normals[at.triangle], rng);
+            let (direction, _) = cosine_weighted(self.facets.normals[at.triangle], rng);
             let Some(hit) = self.next_hit(&at, direction).filter(|hit| hit.front) else { break };
             throughput *= self.passed(&at, direction, hit.distance);
             if bounce > 1 {
@@ -479,8 +480,8 @@ impl<'a> PathTracer<'a> {
         let place = random_barycentric(rng);
         let to = point_at(self.scene.corners(light), place) - at.position;
         let (direction, distance) = to.normalize_and_length();
-        let cosine = self.normals[at.triangle].dot(direction);
-        let facing = -self.normals[light].dot(direction);
+        let cosine = self.facets.normals[at.triangle].dot(direction);
+        let facing = -self.facets.normals[light].dot(direction);
         // Written so that NaN, of a light that is met, sees nothing.
         if !(cosine > 0.0 && facing > 0.0 && self.scene.is_solid(light, place)) {
             return Rgb::ZERO;
@@ -500,7 +501,7 @@ impl<'a> PathTracer<'a> {
     /// Irradiance at `at` from one point of the sun, W/m². No path meets the sun by itself.
     pub(crate) fn irradiance_of_sun(&self, at: &SurfacePoint, sun: &Sun, rng: &mut Rng) -> Rgb {
         let direction = sun.towards([rng.f64(), rng.f64()]);
-        let cosine = self.normals[at.triangle].dot(direction);
+        let cosine = self.facets.normals[at.triangle].dot(direction);
         let between = self.contact..f64::INFINITY;
         let hides = |hit: &Hit| hit.triangle != at.triangle;
         if cosine <= 0.0 || self.rays.occluded(at.position, direction, between, hides) {
@@ -511,7 +512,7 @@ impl<'a> PathTracer<'a> {
 
     /// Irradiance at `at` from one point of a luminaire, W/m². No path meets one by itself.
     fn irradiance_of_luminaire(&self, at: &SurfacePoint, rng: &mut Rng) -> Rgb {
-        let normal = self.normals[at.triangle];
+        let normal = self.facets.normals[at.triangle];
         let luminaires = self.scene.luminaires();
         let chosen = self.luminaires.choose(luminaires, at.position, normal, rng);
         let Some((luminaire, probability)) = chosen else { return Rgb::ZERO };

@@ -33,7 +33,8 @@ pub(crate) const MAX_NORMAL_DEVIATION_DEGREES: f64 = 35.0;
 /// triangles; the clusters of two parts follow.
 #[derive(Clone, Debug)]
 pub(crate) struct Clusters {
-    clusters: Vec<Cluster>,
+    /// Number of triangles.
+    triangles: usize,
     /// The two parts of each cluster that is not a triangle.
     parts: Vec<[u32; 2]>,
     /// Clusters without a parent, ascending.
@@ -58,6 +59,11 @@ struct Cluster {
 impl Clusters {
     /// The clusters of `scene`, in time that is linear in its triangles but for the sorting.
     pub fn new(scene: &Scene) -> Clusters {
+        Clusters::with_properties(scene).0
+    }
+
+    /// The same, and the properties of each cluster, which only merging uses.
+    fn with_properties(scene: &Scene) -> (Clusters, Vec<Cluster>) {
         let count = scene.triangles().len();
         let mut beside = neighbours(&SurfaceTopology::ignoring_smoothing_groups(scene));
         let mut clusters: Vec<Cluster> = (0..count).map(|t| Cluster::of(scene, t)).collect();
@@ -92,7 +98,8 @@ impl Clusters {
             beside.push(others);
         }
         let roots = (0..clusters.len() as u32).filter(|&c| is_root[c as usize]).collect();
-        Clusters { clusters, parts, roots }
+        parts.shrink_to_fit();
+        (Clusters { triangles: count, parts, roots }, clusters)
     }
 
     /// Clusters that together cover every triangle once and are part of no other.
@@ -102,7 +109,7 @@ impl Clusters {
 
     /// Number of clusters, single triangles included.
     pub fn count(&self) -> usize {
-        self.clusters.len()
+        self.triangles + self.parts.len()
     }
 
     /// All parts, in the order of the clusters.
@@ -112,8 +119,7 @@ impl Clusters {
 
     /// The two parts of `cluster`, or `None` for a triangle.
     pub fn parts(&self, cluster: u32) -> Option<[u32; 2]> {
-        let triangles = self.clusters.len() - self.parts.len();
-        (cluster as usize).checked_sub(triangles).map(|k| self.parts[k])
+        (cluster as usize).checked_sub(self.triangles).map(|k| self.parts[k])
     }
 
     /// The triangles of `cluster`, ascending.
@@ -250,12 +256,12 @@ mod tests {
     #[test]
     fn clusters_partition_the_triangles() {
         for scene in [cylinder(), sphere(), disc(), striped()] {
-            let clusters = Clusters::new(&scene);
+            let (clusters, properties) = Clusters::with_properties(&scene);
             let mut all: Vec<u32> =
                 clusters.roots().iter().flat_map(|&c| clusters.triangles(c)).collect();
             all.sort();
             assert_eq!(all, (0..scene.triangles().len() as u32).collect::<Vec<_>>());
-            for c in 0..clusters.clusters.len() as u32 {
+            for c in 0..clusters.count() as u32 {
                 let Some(parts) = clusters.parts(c) else {
                     assert_eq!(clusters.triangles(c), [c]);
                     continue;
@@ -264,7 +270,7 @@ mod tests {
                 both.sort();
                 assert_eq!(both, clusters.triangles(c));
                 let area: f64 = both.iter().map(|&t| scene.area(t as usize)).sum();
-                assert!((clusters.clusters[c as usize].area / area - 1.0).abs() < 1e-12);
+                assert!((properties[c as usize].area / area - 1.0).abs() < 1e-12);
             }
         }
     }
@@ -272,10 +278,10 @@ mod tests {
     #[test]
     fn normals_stay_within_maximum_deviation() {
         for scene in [cylinder(), sphere()] {
-            let clusters = Clusters::new(&scene);
+            let (clusters, properties) = Clusters::with_properties(&scene);
             let mut widest = 0.0_f64;
-            for c in 0..clusters.clusters.len() as u32 {
-                let axis = clusters.clusters[c as usize].axis;
+            for c in 0..clusters.count() as u32 {
+                let axis = properties[c as usize].axis;
                 for t in clusters.triangles(c) {
                     widest = widest.max(axis.angle_between(scene.normal(t as usize)));
                 }
@@ -293,7 +299,7 @@ mod tests {
     #[test]
     fn smooth_surfaces_merge_until_no_pair_may() {
         let roots = |scene: &Scene| {
-            let clusters = Clusters::new(scene);
+            let (clusters, properties) = Clusters::with_properties(scene);
             let mut root_of = vec![0; scene.triangles().len()];
             for &root in clusters.roots() {
                 for t in clusters.triangles(root) {
@@ -305,7 +311,7 @@ mod tests {
             for (a, others) in neighbours(&topology).iter().enumerate() {
                 for &b in others {
                     let [a, b] = [root_of[a], root_of[b as usize]];
-                    assert!(a == b || candidate(&clusters.clusters, a, b).is_none(), "{a} {b}");
+                    assert!(a == b || candidate(&properties, a, b).is_none(), "{a} {b}");
                 }
             }
             clusters.roots().len()

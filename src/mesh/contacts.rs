@@ -56,7 +56,7 @@ impl Mesh {
 
     /// The same, without splitting elements no longer than `finest` (scene unit).
     pub(crate) fn split_at_contacts_down_to(&self, levels: u32, finest: f64) -> Mesh {
-        let count = self.depths.len();
+        let count = self.trees.depths.len();
         let tolerances: Vec<f64> =
             (0..count).map(|t| self.contact_distance(t, self.depth(t))).collect();
         let boxes: Vec<Aabb> = (0..count)

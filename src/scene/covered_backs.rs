@@ -10,12 +10,14 @@
 //!                           front of s
 //! ```
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::covers::Covers;
-use super::{Scene, longest_edge};
+use super::{Facets, Scene, longest_edge};
 use crate::geometry::FILE_TOLERANCE;
 use crate::geometry::incidence::Incidence;
 use crate::geometry::polygon::{polygon_area, polygon_difference};
@@ -32,8 +34,7 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
     let corners = &welded.corners[..];
     let meeting =
         Incidence::new(welded.positions, || corners.iter().map(<[u32; 3]>::as_slice).enumerate());
-    let normals = (0..count).into_par_iter().map(|t| scene.normal(t)).collect();
-    let surfaces = Surfaces { scene, normals, corners, meeting };
+    let surfaces = Surfaces { scene, facets: scene.facets(), corners, meeting };
     let covers: Vec<Option<Vec<u32>>> =
         (0..count).into_par_iter().map(|t| surfaces.covers(t)).collect();
     Covers::new((0..).zip(covers).filter_map(|(t, covers)| Some((t, covers?))))
@@ -42,7 +43,7 @@ pub(super) fn covered_backs(scene: &Scene) -> Covers {
 /// Triangles by the positions of their corners.
 struct Surfaces<'a> {
     scene: &'a Scene,
-    normals: Vec<DVec3>,
+    facets: Arc<Facets>,
     /// Per triangle, the positions of its corners by number.
     corners: &'a [[u32; 3]],
     /// The triangles that meet at each position.
@@ -58,7 +59,7 @@ impl Surfaces<'_> {
     /// Subtracts the fronts in the plane of triangle `t` from it, from its corners outwards;
     /// returns these fronts if nothing is left.
     fn covers(&self, t: usize) -> Option<Vec<u32>> {
-        let (corners, normal) = (self.scene.corners(t), self.normals[t]);
+        let (corners, normal) = (self.scene.corners(t), self.facets.normals[t]);
         let touching = || self.corners[t].iter().flat_map(|&v| self.meeting_at(v));
         let covers_some = |&s: &u32| self.cover(t, (corners, normal), s as usize).is_some();
         // Light passes a clear triangle from either side.
@@ -102,7 +103,7 @@ impl Surfaces<'_> {
         (corners, normal): ([DVec3; 3], DVec3),
         s: usize,
     ) -> Option<[DVec3; 3]> {
-        if normal.dot(self.normals[s]) >= 0.0 || self.scene.is_clear(s) {
+        if normal.dot(self.facets.normals[s]) >= 0.0 || self.scene.is_clear(s) {
             return None;
         }
         let of_s = self.scene.corners(s);

@@ -27,19 +27,29 @@ impl Piece {
 impl Scene {
     /// The same surfaces in `pieces` of each triangle.
     pub(crate) fn cut(&self, pieces: Vec<Vec<Piece>>) -> Scene {
-        let mut scene = Scene { positions: vec![], triangles: vec![], ..self.clone() };
+        let mut scene = Scene { triangles: vec![], ..self.clone() };
         let mut textures = (*self.textures).clone();
         textures.coordinates.clear();
         textures.colours.clear();
         textures.relative_exitance.clear();
         textures.solid_shares.clear();
         scene.cut_sides.clear();
+        let count = pieces.iter().map(Vec::len).sum();
+        let of_cut: usize = pieces.iter().map(Vec::len).filter(|&pieces| pieces > 1).sum();
+        scene.positions.reserve_exact(3 * of_cut);
+        scene.triangles.reserve_exact(count);
+        scene.cut_sides.reserve_exact(count);
         let mut firsts = vec![0];
         for (t, pieces) in pieces.into_iter().enumerate() {
+            let is_whole = pieces.len() == 1;
             for piece in pieces {
-                let first = scene.positions.len() as u32;
-                scene.positions.extend(piece.corners);
-                let corners = [first, first + 1, first + 2];
+                let corners = match is_whole {
+                    true => self.triangles[t].corners,
+                    false => piece.corners.map(|position| {
+                        scene.positions.push(position);
+                        scene.positions.len() as u32 - 1
+                    }),
+                };
                 scene.triangles.push(Triangle { corners, ..self.triangles[t] });
                 scene.cut_sides.push(piece.cut);
                 if let Some([a, b, c]) = self.texture_coordinates(t) {

@@ -30,7 +30,7 @@ pub(super) struct Collapse {
 struct Cut {
     cost: [f32; WIDTH],
     /// Maximum number of roots in the left child's part; 0 where the node itself is the root.
-    left: [usize; WIDTH],
+    left: [u8; WIDTH],
 }
 
 impl Collapse {
@@ -50,7 +50,7 @@ impl Collapse {
         let mut children = ArrayVec::new();
         let mut open = vec![(root, WIDTH)];
         while let Some((node, roots)) = open.pop() {
-            match (tree.nodes[node].children, self.cuts[node].left[roots - 1]) {
+            match (tree.nodes[node].children, usize::from(self.cuts[node].left[roots - 1])) {
                 (Some(first), left) if left > 0 => {
                     open.extend([(first + 1, roots - left), (first, left)]);
                 }
@@ -76,7 +76,7 @@ impl Cut {
             let before = cut.cost[roots - 2];
             let is_better = cost <= before;
             cut.cost[roots - 1] = if is_better { cost } else { before };
-            cut.left[roots - 1] = if is_better { k } else { cut.left[roots - 2] };
+            cut.left[roots - 1] = if is_better { k as u8 } else { cut.left[roots - 2] };
         }
         cut
     }

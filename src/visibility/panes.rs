@@ -40,10 +40,9 @@ impl Panes {
         self.rays.is_none()
     }
 
-    /// Their hierarchy, whose triangles are numbered in the order of the scene's panes, and the
-    /// transmittance of each, per channel.
-    pub fn hierarchy(&self) -> Option<(&RayScene, &[Rgb])> {
-        Some((self.rays.as_ref()?, &self.transmittance))
+    /// The transmittance per channel of each pane, in the order of the scene's triangles.
+    pub fn transmittances(&self) -> &[Rgb] {
+        &self.transmittance
     }
 
     /// Transmittance per channel of all panes along `direction` (any length) from `from` within

@@ -30,7 +30,7 @@ const BOX_MARGIN: f32 = 1e-6 * SCENE_SIZE;
 
 /// Conversion from the scene's unit to the hierarchy's.
 #[derive(Debug)]
-pub(super) struct LocalUnit {
+pub(crate) struct LocalUnit {
     /// Middle of the scene.
     origin: DVec3,
     scale: f64,
@@ -82,10 +82,24 @@ impl LocalUnit {
         Aabb32 { low: a.min(b).min(c) - BOX_MARGIN, high: a.max(b).max(c) + BOX_MARGIN }
     }
 
+    /// Whether rays from `from`, scene unit, keep within the margins: no further from the centre
+    /// than twice the size of what is to be hit.
+    #[inline(always)]
+    pub fn is_near(&self, from: DVec3) -> bool {
+        self.to_local(from).abs().max_element() <= 2.0 * f64::from(SCENE_SIZE)
+    }
+
+    /// The distance along `direction` (any length, in units of it) from `from` to the point nearest
+    /// to the centre.
+    #[inline(always)]
+    pub fn nearest_to_centre(&self, from: DVec3, direction: DVec3) -> f64 {
+        (self.origin - from).dot(direction) / direction.length_squared()
+    }
+
     /// The ray along `direction` (any length) from `from` within `reach` in units of it, and the
     /// length of that unit in units of the ray's own.
     #[inline]
-    pub fn ray(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> (Ray32, f64) {
+    pub(super) fn ray(&self, from: DVec3, direction: DVec3, reach: Range<f64>) -> (Ray32, f64) {
         let length = direction.abs().max_element();
         let unit = (direction * length.recip()).as_vec3a();
         // No component has an infinite inverse. Across the scene the error is below any rounding.

@@ -19,18 +19,18 @@ use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd, dispatch};
-use glam::{DVec3, Vec3A};
-use rayon::prelude::*;
+use glam::DVec3;
 
 use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 use super::cut_outs::CutOuts;
+use super::instances::{InstanceRay, Instances, StreamBuffers};
 use super::ray_stream::{MAX_STREAM, OpenChildren};
-use super::ray32::{LocalUnit, Ray32, rounded_up};
-use super::sah_tree::{Aabb32, SahTree};
-use super::triangle_plane::TrianglePlane;
-use super::wide_bvh::{Child, WideBvh};
+use super::ray32::Ray32;
+use super::repeated_groups::RepeatedGroups;
+use super::triangle_bvh::{self, TriangleBvh};
+use super::triangle_tree::TriangleTree;
 
 pub(crate) use super::triangle_plane::Hit;
 
@@ -38,11 +38,10 @@ pub(crate) use super::triangle_plane::Hit;
 /// in 64.
 #[derive(Debug)]
 pub(crate) struct RayScene {
-    bvh: WideBvh,
-    tree: SahTree,
-    /// In the order of the hierarchy.
-    triangles: Vec<TrianglePlane>,
-    unit: LocalUnit,
+    triangles: TriangleBvh,
+    /// Further triangles, in groups that are images of one another; `None` unless they are at least
+    /// half of all.
+    instances: Option<Instances>,
     /// `None` if no triangle has holes.
     cut_outs: Option<CutOuts>,
     /// Vector instructions of this machine.
@@ -59,34 +58,27 @@ struct Stream {
     /// Of the directions, in units of the rays' own.
     lengths: ArrayVec<f64, MAX_STREAM>,
     open: OpenChildren,
+    at_instances: StreamBuffers,
 }
 
 impl RayScene {
     /// The scene of triangles given by their corners.
     pub fn new(corners: impl Iterator<Item = [DVec3; 3]>) -> RayScene {
         let corners: Vec<[DVec3; 3]> = corners.collect();
-        let all = (0..corners.len() as u32).collect();
-        RayScene::of_some(corners, all)
+        let bounds = Aabb::from_points(corners.iter().flatten().copied());
+        let (all, corners) = ((0..corners.len() as u32).collect(), |t: usize| corners[t]);
+        RayScene::over(TriangleTree::new(all, corners, &bounds), corners)
     }
 
-    /// The scene of the triangles with these `indices`; rays do not hit the others.
-    fn of_some(corners: Vec<[DVec3; 3]>, indices: Vec<u32>) -> RayScene {
-        let unit = LocalUnit::new(&Aabb::from_points(corners.iter().flatten().copied()));
-        let corners = |k: u32| corners[indices[k as usize] as usize];
-        let boxes: Vec<Aabb32> =
-            (0..indices.len() as u32).map(|k| unit.bounds(corners(k))).collect();
-        let tree = SahTree::new(&boxes);
-        let bvh = WideBvh::new(&tree, |k| corners(k).map(|corner| unit.to_local(corner)));
-        let plane = |&k: &u32| TrianglePlane::new(indices[k as usize], corners(k));
-        let triangles = tree.order.par_iter().map(plane).collect();
-        RayScene { bvh, tree, triangles, unit, cut_outs: None, level: Level::new() }
+    /// The scene of the triangles in a tree, which have these `corners`.
+    fn over(tree: TriangleTree, corners: impl Fn(usize) -> [DVec3; 3] + Sync) -> RayScene {
+        let triangles = TriangleBvh::new(tree, corners);
+        RayScene { triangles, instances: None, cut_outs: None, level: Level::new() }
     }
 
     /// The same scene, in which rays do not hit the backs of `covered` triangles.
     pub fn with_covered_backs(mut self, covered: impl Fn(usize) -> bool) -> RayScene {
-        for plane in &mut self.triangles {
-            plane.back_is_covered = covered(plane.triangle as usize);
-        }
+        self.triangles.cover_backs(covered);
         self
     }
 
@@ -114,27 +106,18 @@ impl RayScene {
     }
 
     fn of_triangles(scene: &Scene, is_included: impl Fn(usize) -> bool) -> RayScene {
-        let count = scene.triangles().len();
-        let indices = (0..count as u32).filter(|&t| is_included(t as usize)).collect();
-        RayScene::of_some((0..count).map(|t| scene.corners(t)).collect(), indices)
-            .with_covered_backs(|t| scene.is_back_covered(t))
-            .with_cut_outs(CutOuts::new(scene, 0..count))
-    }
-
-    /// The binary tree that the hierarchy was built from, in its own unit: see
-    /// [`RayScene::in_scene_unit`].
-    pub fn tree(&self) -> &SahTree {
-        &self.tree
-    }
-
-    /// Converts a position from the hierarchy's unit to that of the scene.
-    pub fn in_scene_unit(&self, position: Vec3A) -> DVec3 {
-        self.unit.in_scene_unit(position.as_dvec3())
-    }
-
-    /// The indices of the triangles, in the order of the tree.
-    pub fn triangles(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.triangles.iter().map(|plane| plane.triangle as usize)
+        let groups = RepeatedGroups::of_scene(scene, &is_included);
+        let has_repeats = 2 * groups.saved() >= scene.triangles().len();
+        let tree = match has_repeats {
+            true => TriangleTree::new(groups.others.clone(), |t| scene.corners(t), &scene.bounds()),
+            false => TriangleTree::of_scene(scene, is_included),
+        };
+        RayScene {
+            instances: has_repeats.then(|| Instances::new(scene, &groups)),
+            ..RayScene::over(tree, |t| scene.corners(t))
+        }
+        .with_covered_backs(|t| scene.is_back_covered(t))
+        .with_cut_outs(CutOuts::new(scene, 0..scene.triangles().len()))
     }
 
     /// The nearest hit along `direction` (any length) from `from`, further than `start` and not on
@@ -172,16 +155,24 @@ impl RayScene {
         ignored: Option<usize>,
         counts: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        let (mut ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
-        self.bvh.trace(simd, Child::ROOT, &mut ray, |k| {
-            let plane = &self.triangles[k];
-            let hit = plane.nearer((from, direction), start, ignored, best)?;
+        let (ray, mut best): (_, Option<Hit>) = ((from, direction), None);
+        self.triangles.trace(simd, ray, start..f64::INFINITY, |plane| {
+            let hit = plane.nearer(ray, start, ignored, best)?;
             if !self.is_solid(&hit) || !counts(&hit) {
                 return None;
             }
             best = Some(hit);
-            Some(rounded_up(hit.distance * length))
+            Some(hit.distance)
+        });
+        let Some(instances) = &self.instances else { return best };
+        let end = best.map_or(f64::INFINITY, |hit| hit.distance);
+        instances.trace(simd, ray, start..end, |plane, InstanceRay { from, direction, first }| {
+            let hit = plane.nearer_of((from, direction), start, ignored, best, first)?;
+            if !self.is_solid(&hit) || !counts(&hit) {
+                return None;
+            }
+            best = Some(hit);
+            Some(hit.distance)
         });
         best
     }
@@ -218,28 +209,46 @@ impl RayScene {
         start: f64,
         ignored: Option<usize>,
     ) {
-        let Stream { directions, hits, rays, lengths, open } = stream;
+        let Stream { directions, hits, rays, lengths, open, at_instances } = stream;
         hits.clear();
         rays.clear();
         lengths.clear();
         for &direction in &*directions {
-            let (ray, length) = self.unit.ray(from, direction, start..f64::INFINITY);
+            let (ray, length) = self.triangles.unit.ray(from, direction, start..f64::INFINITY);
             hits.push(None);
             rays.push(ray);
             lengths.push(length);
         }
-        self.bvh.trace_stream(
+        self.triangles.trace_stream(
             simd,
-            (rays, open),
+            triangle_bvh::Stream { rays, lengths, open },
             #[inline(always)]
-            |ray, k| {
-                let plane = &self.triangles[k];
+            |ray, plane| {
                 let hit = plane.nearer((from, directions[ray]), start, ignored, hits[ray])?;
                 if !self.is_solid(&hit) {
                     return None;
                 }
                 hits[ray] = Some(hit);
-                Some(rounded_up(hit.distance * lengths[ray]))
+                Some(hit.distance)
+            },
+        );
+        let Some(instances) = &self.instances else { return };
+        let ends: ArrayVec<f64, MAX_STREAM> =
+            hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.distance)).collect();
+        instances.trace_stream(
+            simd,
+            (from, directions),
+            (start, |ray| ends[ray]),
+            at_instances,
+            #[inline(always)]
+            |ray, plane, InstanceRay { from, direction, first }| {
+                let ray_there = (from, direction);
+                let hit = plane.nearer_of(ray_there, start, ignored, hits[ray], first)?;
+                if !self.is_solid(&hit) {
+                    return None;
+                }
+                hits[ray] = Some(hit);
+                Some(hit.distance)
             },
         );
     }
@@ -264,15 +273,29 @@ impl RayScene {
         reach: Range<f64>,
         mut counts: impl FnMut(&Hit) -> bool,
     ) -> bool {
-        let (mut ray, _) = self.unit.ray(from, direction, reach.clone());
         let mut blocked = false;
-        self.bvh.trace(simd, Child::ROOT, &mut ray, |k| {
-            let hit = self.triangles[k].intersect(from, direction, reach.clone());
+        self.triangles.trace(simd, (from, direction), reach.clone(), |plane| {
+            let hit = plane.intersect(from, direction, reach.clone());
             blocked |= hit.is_some_and(|hit| self.is_solid(&hit) && counts(&hit));
             // Ends the traversal.
-            blocked.then_some(f32::NEG_INFINITY)
+            blocked.then_some(f64::NEG_INFINITY)
+        });
+        let Some(instances) = self.instances.as_ref().filter(|_| !blocked) else { return blocked };
+        instances.trace(simd, (from, direction), reach.clone(), |plane, ray| {
+            let hit = plane.intersect(ray.from, ray.direction, reach.clone());
+            blocked |= hit.is_some_and(|mut hit| {
+                hit.triangle += ray.first as usize;
+                self.is_solid(&hit) && counts(&hit)
+            });
+            blocked.then_some(f64::NEG_INFINITY)
         });
         blocked
+    }
+
+    /// Whether triangles are stored once for several groups.
+    #[cfg(test)]
+    pub fn has_instances(&self) -> bool {
+        self.instances.is_some()
     }
 
     /// Whether a hit is in no hole.
@@ -287,6 +310,7 @@ impl RayScene {
 mod tests {
     use super::*;
     use crate::scene::{Material, Rgb, Specular, Triangle};
+    use crate::visibility::triangle_plane::TrianglePlane;
 
     #[test]
     fn closest_hit_skips_ignored_triangle() {
@@ -386,7 +410,7 @@ mod tests {
                     let nearer = |best, plane: &TrianglePlane| {
                         plane.nearer((from, direction), start, None, best).or(best)
                     };
-                    rays.triangles.iter().fold(None, nearer)
+                    rays.triangles.triangles.iter().fold(None, nearer)
                 };
                 let mut each = directions.iter();
                 rays.closest_hits(from, directions.iter().copied(), start, None, |d, hit| {
@@ -398,7 +422,8 @@ mod tests {
                     for reach in [start..end, start..0.999 * end, end..1.0] {
                         let blocks =
                             |plane: &TrianglePlane| plane.intersect(from, d, reach.clone());
-                        let blocked = rays.triangles.iter().any(|plane| blocks(plane).is_some());
+                        let blocked =
+                            rays.triangles.triangles.iter().any(|plane| blocks(plane).is_some());
                         assert_eq!(rays.occluded(from, d, reach, |_| true), blocked, "{from} {d}");
                     }
                 });

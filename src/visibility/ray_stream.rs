@@ -19,7 +19,7 @@ use fearless_simd::{Simd, SimdBase, f32x8};
 
 use super::collapse::WIDTH;
 use super::ray32::{LoadedPlanes, Ray32, planes_from, splat};
-use super::wide_bvh::{Child, ChildKind, WideBvh};
+use super::wide_bvh::{Child, ChildKind, Visit, WideBvh};
 
 /// Maximum number of rays traced together. Their indices are bytes; twice as many are no faster per
 /// ray.
@@ -29,14 +29,13 @@ pub(super) const MAX_STREAM: usize = 64;
 type Rays = ArrayVec<u8, MAX_STREAM>;
 
 impl WideBvh {
-    /// As [`WideBvh::trace`] for each of `rays`, at most [`MAX_STREAM`] from one origin: the first
-    /// argument of `may_meet` is the index of the ray.
+    /// As [`WideBvh::trace`] for each of `rays`, at most [`MAX_STREAM`] from one origin.
     #[inline(always)]
     pub fn trace_stream<S: Simd>(
         &self,
         simd: S,
         (rays, open): (&mut [Ray32], &mut OpenChildren),
-        mut may_meet: impl FnMut(usize, usize) -> Option<f32>,
+        visitor: &mut impl Visit<S>,
     ) {
         let Some(&Ray32 { origin, .. }) = rays.first() else { return };
         let origins = splat(simd, origin);
@@ -44,7 +43,7 @@ impl WideBvh {
         while let Some((child, active)) = open.pop() {
             if let &[ray] = active.as_slice() {
                 let ray = usize::from(ray);
-                self.trace(simd, child, &mut rays[ray], |triangle| may_meet(ray, triangle));
+                self.trace(simd, child, (ray, &mut rays[ray]), visitor);
                 continue;
             }
             match child.kind() {
@@ -68,13 +67,7 @@ impl WideBvh {
                         open.push(node.children[k], &active, |ray| masks[ray] >> k & 1);
                     }
                 }
-                ChildKind::Pack(pack) => {
-                    let pack = &self.packs[pack];
-                    let seen = pack.seen_from(simd, origin);
-                    for ray in active.iter().map(|&ray| usize::from(ray)) {
-                        seen.trace(simd, pack.first, &mut rays[ray], |k| may_meet(ray, k));
-                    }
-                }
+                ChildKind::Leaf(leaf) => visitor.stream(simd, leaf, &active, rays),
             }
         }
     }

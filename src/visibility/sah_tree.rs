@@ -77,20 +77,25 @@ impl SahTree {
     /// discriminate, or levels run out. That takes n log n time even if all boxes coincide or are
     /// nested.
     pub fn new(boxes: &[Aabb32]) -> SahTree {
+        SahTree::with_leaves(boxes, MAX_LEAF_SIZE)
+    }
+
+    /// The same with at most so many boxes in a leaf, where levels do not run out.
+    pub fn with_leaves(boxes: &[Aabb32], leaf_size: usize) -> SahTree {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        let nodes = nodes_over(boxes, &mut order, MAX_LEVELS);
+        let nodes = nodes_over(boxes, &mut order, MAX_LEVELS, leaf_size);
         SahTree { order, nodes }
     }
 }
 
 /// The nodes over boxes in this `order`, which is changed; at most `levels` below the root.
-fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32) -> Vec<SahNode> {
+fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32, leaf_size: usize) -> Vec<SahNode> {
     let mut nodes = vec![SahNode::over(boxes, order, 0..order.len())];
     // Parallel tasks; results do not depend on their size.
     if order.len() > 4096 {
         let (half, _) = split(boxes, order, levels - 1);
         let (first, second) = order.split_at_mut(half);
-        let below = |part| nodes_over(boxes, part, levels - 1);
+        let below = |part| nodes_over(boxes, part, levels - 1, leaf_size);
         let (mut first, mut second) = rayon::join(|| below(first), || below(second));
         // Both roots are adjacent, followed by the nodes below each.
         first.iter_mut().for_each(|node| node.shift(0, 2));
@@ -112,7 +117,7 @@ fn nodes_over(boxes: &[Aabb32], order: &mut [u32], levels: u32) -> Vec<SahNode> 
         // A step down costs two tests of a triangle: a few boxes stay together in a leaf where a
         // split saves less. Of 0, 1, 2, 3, 4, 8 and 100 the best in rooms of 32 to 128 000
         // triangles, or within 3 % of it.
-        if items.len() <= MAX_LEAF_SIZE && saved <= 2.0 * bounds.half_area() {
+        if items.len() <= leaf_size && saved <= 2.0 * bounds.half_area() {
             continue;
         }
         let (first, middle) = (nodes.len(), items.start + half);

@@ -81,13 +81,27 @@ impl TrianglePlane {
         ignored: Option<usize>,
         best: Option<Hit>,
     ) -> Option<Hit> {
-        if Some(self.triangle as usize) == ignored {
+        self.nearer_of((from, direction), start, ignored, best, 0)
+    }
+
+    /// The same of a triangle whose index is greater by `first`.
+    #[inline(always)]
+    pub fn nearer_of(
+        &self,
+        (from, direction): (DVec3, DVec3),
+        start: f64,
+        ignored: Option<usize>,
+        best: Option<Hit>,
+        first: u32,
+    ) -> Option<Hit> {
+        if Some((self.triangle + first) as usize) == ignored {
             return None;
         }
         // Rounded up, so that equal distances are still compared.
         let rounding = |b: &Hit| 4.0 * f64::EPSILON * b.distance.abs();
         let end = best.as_ref().map_or(f64::INFINITY, |b| b.distance + rounding(b));
-        let hit = self.intersect(from, direction, start..end)?;
+        let mut hit = self.intersect(from, direction, start..end)?;
+        hit.triangle += first as usize;
         let is_behind =
             best.is_some_and(|b| (b.distance, b.triangle) < (hit.distance, hit.triangle));
         (!is_behind).then_some(hit)

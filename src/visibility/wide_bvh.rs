@@ -1,69 +1,85 @@
-//! The bounding volume hierarchy for rays: eight-wide, with four triangles per leaf.
+//! The bounding volume hierarchy for rays: eight-wide, with leaves of any kind.
 //!
 //! ```text
-//! triangles ──► binary tree of boxes ──► nodes of eight boxes ──► leaves of four triangles
-//!               (sah_tree)               tested at once (ray32)   tested at once (triangle_pack)
+//! boxes ──► binary tree of boxes ──► nodes of eight boxes ──► leaves: triangles (triangle_bvh)
+//!           (sah_tree)               tested at once (ray32)           or repeated groups (places)
 //! ```
 //!
 //! A step down costs the latency of the one before and an unpredictable branch, far more than its
 //! arithmetic; so nodes are wide and few (Dammertz, Hanika, Keller 2008; Wald, Benthin, Boulos
 //! 2008). Both tests are in 32 bits and conservative: candidates go to the exact test.
 
+use std::ops::Range;
+
 use arrayvec::ArrayVec;
 use fearless_simd::{Simd, SimdBase};
-use glam::DVec3;
 
 use super::collapse::{Collapse, WIDTH};
 use super::ray32::{BoxPlanes, Lanes, Ray32, planes_from, splat};
 use super::sah_tree::{MAX_LEVELS, SahTree};
-use super::triangle_pack::TrianglePack;
 
 #[derive(Debug)]
 pub(super) struct WideBvh {
     /// The root first.
     pub nodes: Vec<WideNode>,
-    pub packs: Vec<TrianglePack>,
+}
+
+/// What rays do where they reach a leaf.
+pub(super) trait Visit<S: Simd> {
+    /// One ray, which may be given a nearer end.
+    fn ray(&mut self, simd: S, leaf: usize, index: usize, ray: &mut Ray32);
+
+    /// Those of a stream of `rays` that are `active`, by their indices.
+    fn stream(&mut self, simd: S, leaf: usize, active: &[u8], rays: &mut [Ray32]);
 }
 
 #[derive(Debug)]
 pub(super) struct WideNode {
     pub planes: BoxPlanes,
-    /// Unused ones of the eight are packs without triangles in boxes that no ray hits.
+    /// Unused ones of the eight are leaf 0 in boxes that no ray hits.
     pub children: [Child; WIDTH],
 }
 
-/// The index of a node, or of a pack with the highest bit set.
+/// The index of a node, or of a leaf with the highest bit set.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Child(u32);
 
 pub(super) enum ChildKind {
     Node(usize),
-    Pack(usize),
+    Leaf(usize),
 }
 
 impl Child {
-    const PACK: u32 = 1 << 31;
+    const LEAF: u32 = 1 << 31;
 
     pub const ROOT: Child = Child(0);
 
-    const NOTHING: Child = Child(Child::PACK);
+    const NOTHING: Child = Child(Child::LEAF);
 
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
-        match self.0 & Child::PACK {
+        match self.0 & Child::LEAF {
             0 => ChildKind::Node(self.0 as usize),
-            _ => ChildKind::Pack((self.0 & !Child::PACK) as usize),
+            _ => ChildKind::Leaf((self.0 & !Child::LEAF) as usize),
         }
     }
 }
 
 impl WideBvh {
-    /// Built from the boxes of `tree`, which are those of triangles given by their corners in the
-    /// hierarchy's unit.
-    pub fn new(tree: &SahTree, corners: impl Fn(u32) -> [DVec3; 3]) -> WideBvh {
-        let nothing = TrianglePack::new(0, std::iter::empty());
-        let mut bvh = WideBvh { nodes: vec![], packs: vec![nothing] };
-        bvh.add(tree, &Collapse::new(tree), 0, &corners);
+    /// Built from the boxes of `tree`. `leaf` makes each of its leaves, of a range of the boxes in
+    /// the order of the tree: the first, number 0, of none, and the others in the order of their
+    /// numbers.
+    pub fn new(tree: &SahTree, mut leaf: impl FnMut(Range<usize>)) -> WideBvh {
+        let mut bvh = WideBvh { nodes: vec![] };
+        leaf(0..0);
+        let mut leaves = 1;
+        let mut add_leaf = |items| {
+            leaf(items);
+            leaves += 1;
+            Child(Child::LEAF | (leaves - 1))
+        };
+        bvh.add(tree, &Collapse::new(tree), 0, &mut add_leaf);
+        bvh.nodes.shrink_to_fit();
         bvh
     }
 
@@ -74,7 +90,7 @@ impl WideBvh {
         tree: &SahTree,
         collapse: &Collapse,
         root: usize,
-        corners: &impl Fn(u32) -> [DVec3; 3],
+        leaf: &mut impl FnMut(Range<usize>) -> Child,
     ) -> Child {
         let number = self.nodes.len();
         let nothing = [f32::INFINITY, f32::NEG_INFINITY].map(|side| [Lanes([side; WIDTH]); 3]);
@@ -87,25 +103,23 @@ impl WideBvh {
                 planes[1][axis].0[k] = node.bounds.high[axis];
             }
             self.nodes[number].children[k] = if node.children.is_some() {
-                self.add(tree, collapse, child, corners)
+                self.add(tree, collapse, child, leaf)
             } else {
-                let triangles = tree.order[node.items.clone()].iter().map(|&k| corners(k));
-                self.packs.push(TrianglePack::new(node.items.start, triangles));
-                Child(Child::PACK | (self.packs.len() - 1) as u32)
+                leaf(node.items.clone())
             };
         }
         Child(number as u32)
     }
 
-    /// Calls `may_meet` with each triangle below `root` that `ray` may hit before its end, by their
-    /// indices in the order of the tree, approximately front to back. It may return a new end.
+    /// Visits each leaf below `root` that `ray`, of this `index` for the visitor, may reach before
+    /// its end, approximately front to back.
     #[inline(always)]
     pub fn trace<S: Simd>(
         &self,
         simd: S,
         root: Child,
-        ray: &mut Ray32,
-        mut may_meet: impl FnMut(usize) -> Option<f32>,
+        (index, ray): (usize, &mut Ray32),
+        visitor: &mut impl Visit<S>,
     ) {
         let origin = splat(simd, ray.origin);
         // At most all boxes of a node per level, except the one entered.
@@ -134,10 +148,7 @@ impl WideBvh {
                         continue;
                     }
                 }
-                ChildKind::Pack(pack) => {
-                    let pack = &self.packs[pack];
-                    pack.seen_from(simd, ray.origin).trace(simd, pack.first, ray, &mut may_meet);
-                }
+                ChildKind::Leaf(leaf) => visitor.ray(simd, leaf, index, ray),
             }
             // Boxes that begin beyond the end of the ray are skipped.
             child = loop {

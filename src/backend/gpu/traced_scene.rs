@@ -24,7 +24,7 @@ use crate::gather::lights::{Light, Lights, NO_LIGHT};
 use crate::geometry::barycentric::WHOLE;
 use crate::scene::{Rgb, Scene, SkyMap, Sun};
 use crate::visibility::panes::Panes;
-use crate::visibility::ray_scene::RayScene;
+use crate::visibility::triangle_tree::TriangleTree;
 
 /// Scene data for rays, in buffers of the device.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ impl TracedArrays {
     /// The scene of `lights`.
     pub fn new(lights: &Lights) -> TracedArrays {
         let scene = lights.scene();
-        let rays = RayScene::of_scene(scene);
+        let tree = TriangleTree::of_scene(scene, |t| !scene.is_clear(t));
         let panes = Panes::of_scene(scene);
         let lamps = lights.lights.iter().map(|l| l.exitance.max_element());
         let sky = scene.sky();
@@ -112,17 +112,18 @@ impl TracedArrays {
             sky: vec![[0.0; 4]],
         };
         let has_holes = arrays.add_masks(scene);
-        arrays.add_nodes(&rays, 0);
-        arrays.add_triangles(scene, rays.triangles().map(|t| (t, lights.of_triangle[t])));
+        arrays.add_nodes(&tree, 0);
+        arrays.add_triangles(scene, &tree, |t| lights.of_triangle[t]);
         let blocking = arrays.triangles.len();
-        if let Some((hierarchy, transmittance)) = panes.hierarchy() {
+        if !panes.is_none() {
             let clear: Vec<usize> =
                 (0..scene.triangles().len()).filter(|&t| scene.is_clear(t)).collect();
-            let row = |k: usize| (clear[k], (lights.lights.len() + k) as u32);
-            arrays.add_triangles(scene, hierarchy.triangles().map(row));
-            arrays.lights = transmittance.iter().map(share_row).collect();
+            let tree = TriangleTree::of_scene(scene, |t| scene.is_clear(t));
+            let number = |t: usize| clear.binary_search(&t).expect("a clear one");
+            arrays.add_triangles(scene, &tree, |t| (lights.lights.len() + number(t)) as u32);
+            arrays.lights = panes.transmittances().iter().map(share_row).collect();
             arrays.info.panes = arrays.nodes.len() as u32;
-            arrays.add_nodes(hierarchy, blocking);
+            arrays.add_nodes(&tree, blocking);
         }
         for triangle in &mut arrays.triangles {
             if has_holes.get(triangle.index as usize) == Some(&true) {
@@ -140,15 +141,15 @@ impl TracedArrays {
         arrays
     }
 
-    /// Adds triangles of `scene` by their indices, each with the row of its light.
-    fn add_triangles(&mut self, scene: &Scene, triangles: impl Iterator<Item = (usize, u32)>) {
+    /// Adds the triangles of a tree over `scene`, each with the `row` of its light.
+    fn add_triangles(&mut self, scene: &Scene, tree: &TriangleTree, row: impl Fn(usize) -> u32) {
         let coordinates = &self.coordinates;
-        self.triangles.extend(triangles.map(|(t, light)| coordinates.traced(scene, t, light)));
+        let triangles = tree.triangles.iter().map(|&t| t as usize);
+        self.triangles.extend(triangles.map(|t| coordinates.traced(scene, t, row(t))));
     }
 
-    /// The nodes of a hierarchy whose triangles begin at `first_triangle`.
-    fn add_nodes(&mut self, rays: &RayScene, first_triangle: usize) {
-        let tree = rays.tree();
+    /// The nodes of a tree whose triangles begin at `first_triangle`.
+    fn add_nodes(&mut self, TriangleTree { tree, unit, .. }: &TriangleTree, first_triangle: usize) {
         // Only inner nodes are stored: leaves are encoded in their parents.
         let mut index = vec![u32::MAX; tree.nodes.len()];
         let mut next = self.nodes.len() as u32;
@@ -170,7 +171,8 @@ impl TracedArrays {
         };
         let bounds = |k: usize| {
             let bounds = &tree.nodes[k].bounds;
-            self.coordinates.widened([bounds.low, bounds.high].map(|p| rays.in_scene_unit(p)))
+            let in_scene = |position: Vec3A| unit.in_scene_unit(position.as_dvec3());
+            self.coordinates.widened([bounds.low, bounds.high].map(in_scene))
         };
         let mut nodes = vec![];
         for node in &tree.nodes {

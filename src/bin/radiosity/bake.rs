@@ -158,10 +158,12 @@ impl Bake {
         let opening = Instant::now();
         let device = self.device.open()?;
         let baking = Instant::now();
+        // Otherwise the bake drops the scene once it is cut.
+        let kept = self.keep_mesh.then(|| scene.clone());
         let mut baked = progress::of_bake(|unshot_goal, report| {
-            self.bake(scene.clone(), &device, start, unshot_goal, report)
+            self.bake(scene, &device, start, unshot_goal, report)
         })?;
-        if self.keep_mesh {
+        if let Some(scene) = kept {
             baked = self.on_kept_mesh(&baked, scene, &device)?;
         }
         let band_light = bands::light(bands.as_ref(), &baked)?;

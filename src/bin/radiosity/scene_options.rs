@@ -77,7 +77,7 @@ pub struct SceneOptions {
     #[arg(default_value_t = SceneSettings::MAX_REFLECTANCE)]
     max_reflectance: f64,
     /// Refuse a file that would have to be repaired
-    #[arg(long)]
+    #[arg(long, hide = true)]
     strict: bool,
     /// Scene of a glTF file, by its name or number [its own]
     #[arg(long = "scene", value_name = "NAME", hide = true)]

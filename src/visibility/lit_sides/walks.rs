@@ -14,7 +14,7 @@ use crate::geometry::FILE_TOLERANCE;
 use crate::sampling::hemisphere::cosine_direction;
 use crate::sampling::low_discrepancy::fold_to_triangle;
 use crate::sampling::surface::AreaSampler;
-use crate::scene::{Rgb, Scene, Sides};
+use crate::scene::{Facets, Rgb, Scene, Sides};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
@@ -26,7 +26,7 @@ pub struct Walks<'a> {
     sides: &'a [Sides],
     rays: Arc<RayScene>,
     panes: Panes,
-    normals: Vec<DVec3>,
+    facets: Arc<Facets>,
     /// Triangles that emit.
     lamps: Vec<usize>,
     /// Whether they emit from their backs.
@@ -56,7 +56,7 @@ impl<'a> Walks<'a> {
             sides,
             rays: RayScene::of_scene(scene),
             panes: Panes::of_scene(scene),
-            normals: (0..count).map(|t| scene.normal(t)).collect(),
+            facets: scene.facets(),
             shining_backs: FxHashMap::default(),
             other_sides: lamps_of_other_sides(scene, &lamps),
             powers: AreaSampler::new(lamps.iter().map(power)),
@@ -190,7 +190,7 @@ impl<'a> Walks<'a> {
         let reach = (FILE_TOLERANCE * self.scene.area(t).sqrt()).max(self.contact);
         let mut covering = None;
         self.rays.occluded(at + reach * normal, -normal, 0.0..2.0 * reach, |hit| {
-            let alike = self.normals[hit.triangle].dot(normal) > 0.999;
+            let alike = self.facets.normals[hit.triangle].dot(normal) > 0.999;
             let counts = hit.front && hit.triangle != t && alike;
             if counts {
                 covering = Some(hit.triangle);
@@ -202,7 +202,7 @@ impl<'a> Walks<'a> {
 
     /// Unit normal on a side.
     fn normal(&self, side: SideIndex) -> DVec3 {
-        let front = self.normals[side / 2];
+        let front = self.facets.normals[side / 2];
         if side.is_multiple_of(2) { front } else { -front }
     }
 
