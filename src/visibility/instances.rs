@@ -319,8 +319,7 @@ mod tests {
             // The mirror images are images of one another.
             assert_eq!((groups.shapes.len(), groups.images.len()), (2, count));
             assert_eq!(groups.saved(), 20 * (count - 2));
-            let rays = RayScene::of_scene(&scene);
-            assert!(rays.has_instances());
+            let rays = RayScene::of_instances(&scene).unwrap();
             let flat = RayScene::new((0..20 * count).map(|t| scene.corners(t)));
             let mut hits = 0;
             for k in 0..300 {

@@ -2,11 +2,16 @@
 
     blender -b SCENE.blend --python radiosity_light.py -- [OPTIONS OF radiosity bake]
     blender -b SCENE.blend --python radiosity_light.py -- --error 0.02 --save LIT.blend
+    blender -b SCENE.blend --python radiosity_light.py -- --light-map [OPTIONS OF radiosity light-map]
 
 Exports the scene as glTF with its lamps and cameras, runs `radiosity bake` on it, and stores the
 baked irradiance (W/m2 per channel) on every mesh object as the attribute `radiosity`: colours of
 32-bit floats at face corners. Objects that share a mesh get one each, as their light differs. Every
 material gets a copy that shows it: base colour times irradiance over pi, and what it emits.
+
+With --light-map the light is in an image, packed into the scene: triangulated copies of the objects
+have its coordinates as a UV map, in the collection `radiosity`, and the objects themselves are
+hidden. For walls of two triangles that is more light for less mesh.
 
 RADIOSITY names the program [radiosity]. --save writes the scene to a file; without it, and without
 -b, the light is in the open scene.
@@ -144,10 +149,26 @@ def store(item, light):
     return missing
 
 
-def show(material):
+def light_of_vertices(nodes, links):
+    """The colour of the light that `store` stored."""
+    light = nodes.new("ShaderNodeAttribute")
+    light.attribute_name = ATTRIBUTE
+    return light.outputs["Color"]
+
+
+def light_of_map(image, coordinates):
+    """What gives the colour of the light in an image, at a UV map."""
+    def colour(nodes, links):
+        uv, light = nodes.new("ShaderNodeUVMap"), nodes.new("ShaderNodeTexImage")
+        uv.uv_map, light.image, light.extension = coordinates, image, "EXTEND"
+        links.new(uv.outputs["UV"], light.inputs["Vector"])
+        return light.outputs["Color"]
+    return colour
+
+
+def show(material, name, light_colour):
     """A copy of a material that shows the light: base colour times irradiance over pi, and what it
     emits."""
-    name = f"{material.name} lit"
     if name in bpy.data.materials:
         return bpy.data.materials[name]
     lit = material.copy()
@@ -158,8 +179,6 @@ def show(material):
     output = next((n for n in nodes if n.type == "OUTPUT_MATERIAL" and n.is_active_output), None)
     if shader is None or output is None:
         return material
-    light = nodes.new("ShaderNodeAttribute")
-    light.attribute_name = ATTRIBUTE
     times = nodes.new("ShaderNodeMixRGB")
     times.blend_type = "MULTIPLY"
     times.inputs["Fac"].default_value = 1.0
@@ -167,7 +186,7 @@ def show(material):
     times.inputs["Color2"].default_value = base.default_value
     if base.links:
         links.new(base.links[0].from_socket, times.inputs["Color2"])
-    links.new(light.outputs["Color"], times.inputs["Color1"])
+    links.new(light_colour(nodes, links), times.inputs["Color1"])
     reflected = nodes.new("ShaderNodeEmission")
     reflected.inputs["Strength"].default_value = 1.0 / math.pi
     links.new(times.outputs["Color"], reflected.inputs["Color"])
@@ -184,6 +203,68 @@ def show(material):
     return lit
 
 
+def light_vertices(program, scene, stem, options):
+    """Bakes, and brings the light back to the objects."""
+    subprocess.run([program, "bake", scene, "--write", "glb", "--out", stem, *options], check=True)
+    lights = light_of_nodes(stem + ".glb")
+    lit = missing = 0
+    for item in bpy.context.scene.objects:
+        if item.type == "MESH" and item.name in lights:
+            missing += store(item, lights[item.name])
+            lit += 1
+            for slot in item.material_slots:
+                material = slot.material
+                if material:
+                    slot.link = "OBJECT"
+                    slot.material = show(material, f"{material.name} lit", light_of_vertices)
+    print(f"radiosity: light on {lit} objects, {missing} corners without")
+
+
+def light_by_map(program, scene, stem, options):
+    """Bakes a light map, and shows copies of the objects by it."""
+    subprocess.run(
+        [program, "light-map", scene, "--write", "glb,exr", "--out", stem, *options], check=True)
+    document, _ = read_glb(stem + ".glb")
+    # By node and material: the file of the map, and the number of its coordinates.
+    maps = {}
+    for node in document["nodes"]:
+        for primitive in document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ():
+            light = primitive.get("extras", {}).get("radiosity", {})
+            material = document["materials"][primitive["material"]]["name"] if "material" in primitive else None
+            if "lightMap" in light:
+                maps[node.get("name", ""), material] = light["lightMap"], light["texCoord"]
+    before, materials = set(bpy.data.objects), set(bpy.data.materials)
+    for item in bpy.context.scene.objects:
+        item.hide_render = True
+        item.hide_set(True)
+    bpy.ops.import_scene.gltf(filepath=stem + ".glb")
+    imported = [item for item in bpy.data.objects if item not in before]
+    original = {m: m.name.rsplit(".", 1)[0] if m.name[-4:-3] == "." else m.name
+                for m in bpy.data.materials if m not in materials}
+    collection = bpy.data.collections.new("radiosity")
+    bpy.context.scene.collection.children.link(collection)
+    images, lit = {}, 0
+    for item in imported:
+        for other in item.users_collection:
+            other.objects.unlink(item)
+        collection.objects.link(item)
+        name = item.name[:-4] if item.name[-4:-3] == "." else item.name
+        for slot in item.material_slots if item.type == "MESH" else ():
+            found = maps.get((name, original.get(slot.material)))
+            if found is None:
+                continue
+            file, number = found
+            if file not in images:
+                images[file] = bpy.data.images.load(os.path.join(os.path.dirname(stem), file))
+                images[file].colorspace_settings.name = "Non-Color"
+                images[file].pack()
+            coordinates = item.data.uv_layers[number].name
+            shown = f"{slot.material.name} lit {file} {coordinates}"
+            slot.material = show(slot.material, shown, light_of_map(images[file], coordinates))
+            lit += 1
+    print(f"radiosity: light on {lit} surfaces of {len(imported)} objects")
+
+
 def main(options):
     save = None
     if "--save" in options:
@@ -194,22 +275,13 @@ def main(options):
         scene = os.path.join(folder, "scene.glb")
         export(scene)
         program = os.environ.get("RADIOSITY", "radiosity")
-        stem = os.path.join(folder, "lit")
-        subprocess.run([program, "bake", scene, "--write", "glb", "--out", stem, *options], check=True)
-        lights = light_of_nodes(stem + ".glb")
-    lit = missing = 0
-    for item in bpy.context.scene.objects:
-        if item.type == "MESH" and item.name in lights:
-            missing += store(item, lights[item.name])
-            lit += 1
-            for slot in item.material_slots:
-                material = slot.material
-                if material:
-                    slot.link = "OBJECT"
-                    slot.material = show(material)
+        bring_back = light_vertices
+        if "--light-map" in options:
+            options.remove("--light-map")
+            bring_back = light_by_map
+        bring_back(program, scene, os.path.join(folder, "lit"), options)
     # Light is exposed by the scene, once.
     bpy.context.scene.view_settings.view_transform = "Standard"
-    print(f"radiosity: light on {lit} objects, {missing} corners without")
     if save:
         bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(save))
 
