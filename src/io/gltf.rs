@@ -22,6 +22,7 @@ mod lit;
 mod mapped;
 mod materials;
 mod nodes;
+mod rewritten;
 
 use std::collections::HashSet;
 use std::fs::File;

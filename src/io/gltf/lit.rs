@@ -15,16 +15,11 @@ use serde_json::{Value, json};
 
 use super::accessors::Values;
 use super::additions::{ARRAY_BUFFER, Additions, add_extras, has_other_users};
-use super::container::{Buffers, Container};
-use super::document::Document;
 use super::fault::Fault;
-use super::geometry::{Geometry, Group, MeshReader, bits};
-use super::materials;
-use super::nodes::Nodes;
+use super::geometry::{Group, bits};
+use super::rewritten::{Source, rewritten};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
-use crate::io::cannot_read;
-use crate::io::files::{FileSource, MAX_BYTES, read_bytes};
 use crate::io::glb::GlbSettings;
 use crate::scene::Rgb;
 
@@ -53,34 +48,20 @@ pub fn write_lit_gltf(
     scene: Option<&str>,
     settings: impl Into<GlbSettings>,
 ) -> Result<LitVertices, Error> {
-    let (path, source) = (path.as_ref(), source.as_ref());
-    let at_source = |fault: Fault| fault.at(source.display().to_string());
-    let bytes = read_bytes(source, MAX_BYTES);
-    let bytes = bytes.map_err(|e| cannot_read(source, e, "give the glTF file of the scene"))?;
-    let files = FileSource::in_folder(source.parent().unwrap_or(Path::new("")));
-    let container = Container::new(&bytes).map_err(at_source)?;
-    let document = container.document().map_err(at_source)?;
-    let buffers = Buffers::new(&container, &document, &files);
-    let nodes = Nodes::new(&document, scene).map_err(at_source)?;
-    let set_of = |material: Option<usize>| materials::coordinate_set(&document, material);
-    let geometry = Geometry::new(&document, &buffers, &nodes, &set_of);
-    let geometry = geometry.map_err(|(node, fault)| fault.at(node).inside(source))?;
-    let mut writer = Writer {
-        document: &document,
-        reader: MeshReader::new(&document, &buffers, &nodes, &set_of),
-        light: LightOfGroups::new(light),
-        settings: settings.into(),
-        is_placed: nodes.is_placed(),
-        new: Additions::new(&container, &document).map_err(at_source)?,
-        known: FxHashMap::default(),
-        counts: LitVertices::default(),
-    };
-    for (number, group) in (0u32..).zip(&geometry.places) {
-        writer.light_node(number, group).map_err(at_source)?;
-    }
-    let Writer { new, counts, .. } = writer;
-    new.write(path, &container, &document)?;
-    Ok(counts)
+    rewritten(path.as_ref(), source.as_ref(), scene, |source, new| {
+        let mut writer = Writer {
+            source: &source,
+            light: LightOfGroups::new(light),
+            settings: settings.into(),
+            new,
+            known: FxHashMap::default(),
+            counts: LitVertices::default(),
+        };
+        for (number, group) in (0u32..).zip(source.groups) {
+            writer.light_node(number, group).map_err(|fault| source.error(fault))?;
+        }
+        Ok(writer.counts)
+    })
 }
 
 /// How many vertices of a file have light.
@@ -149,13 +130,10 @@ struct LitMesh {
 }
 
 struct Writer<'a, 'b> {
-    document: &'a Document,
-    reader: MeshReader<'a, 'b>,
+    source: &'a Source<'a, 'b>,
     light: LightOfGroups,
     settings: GlbSettings,
-    /// Whether each node is in the scene.
-    is_placed: Vec<bool>,
-    new: Additions,
+    new: &'a mut Additions,
     /// Of each mesh of the source.
     known: FxHashMap<usize, Vec<LitMesh>>,
     counts: LitVertices,
@@ -168,7 +146,7 @@ impl Writer<'_, '_> {
             self.counts.instances += 1;
             return Ok(());
         }
-        let node = &self.document.nodes[group.node];
+        let node = &self.source.document.nodes[group.node];
         let Some(mesh) = node.mesh else { return Ok(()) };
         let irradiance = self.irradiance(number, group, mesh)?;
         let same = self.known.get(&mesh).and_then(|all| {
@@ -191,15 +169,15 @@ impl Writer<'_, '_> {
         group: &Group,
         mesh: usize,
     ) -> Result<Vec<Vec<Rgb>>, Fault> {
-        let node = &self.document.nodes[group.node];
+        let node = &self.source.document.nodes[group.node];
         let mut all = vec![];
-        for primitive in &self.document.meshes[mesh].primitives {
+        for primitive in &self.source.document.meshes[mesh].primitives {
             let mut of_primitive = vec![];
             if primitive.mode.is_none_or(|mode| (4..=6).contains(&mode))
-                && let Some(positions) = self.reader.posed_vertices(node, mesh, primitive)?
+                && let Some(positions) = self.source.reader.posed_vertices(node, mesh, primitive)?
             {
                 let normals = primitive.attributes.others.get("NORMAL").and_then(Value::as_u64);
-                let normals = normals.map(|k| self.reader.values(k as usize)).transpose()?;
+                let normals = normals.map(|k| self.source.reader.values(k as usize)).transpose()?;
                 let normals = normals.filter(|values| values.has_components(3));
                 let turn = normal_transform(group.world);
                 for (v, p) in positions.into_iter().enumerate() {
@@ -223,7 +201,7 @@ impl Writer<'_, '_> {
     /// Adds a mesh like `mesh` of the source with this light, or adds it to that mesh, if all nodes
     /// that have it are lit and it is the first: its number.
     fn add_mesh(&mut self, mesh: usize, irradiance: Vec<Vec<Rgb>>) -> usize {
-        let is_shared = has_other_users(self.document, &self.is_placed, mesh);
+        let is_shared = has_other_users(self.source.document, &self.source.is_placed, mesh);
         let number = if self.known.contains_key(&mesh) || is_shared {
             let copy = self.new.source["meshes"][mesh].clone();
             self.new.push("meshes", copy)
@@ -233,7 +211,7 @@ impl Writer<'_, '_> {
         // Primitives that share their vertices share their light.
         let mut shared: FxHashMap<(usize, bool), [Option<usize>; 2]> = FxHashMap::default();
         for (k, of_primitive) in irradiance.iter().enumerate().filter(|(_, all)| !all.is_empty()) {
-            let attributes = &self.document.meshes[mesh].primitives[k].attributes;
+            let attributes = &self.source.document.meshes[mesh].primitives[k].attributes;
             let Some(position) = attributes.position else { continue };
             let has_colours = attributes.colour.is_some();
             let accessors = match shared.get(&(position, has_colours)) {

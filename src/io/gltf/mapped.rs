@@ -16,16 +16,13 @@ use super::accessors::Values;
 use super::additions::{
     ARRAY_BUFFER, Additions, ELEMENT_ARRAY_BUFFER, add_extras, has_other_users,
 };
-use super::container::{Buffers, Container};
-use super::document::{Document, Primitive};
+use super::document::Primitive;
 use super::fault::Fault;
-use super::geometry::{Geometry, Group, MeshReader, bits, check_number, triangles_of};
-use super::materials;
-use super::nodes::Nodes;
+use super::geometry::{Group, bits, check_number, triangles_of};
+use super::rewritten::{Source, rewritten};
 use crate::error::Error;
-use crate::io::files::{FileSource, MAX_BYTES, read_bytes};
+use crate::io::cannot_write;
 use crate::io::glb::{GlbSettings, png};
-use crate::io::{cannot_read, cannot_write};
 use crate::light_map::{LightMap, MapPage};
 use crate::scene::{Rgb, luminance};
 
@@ -64,44 +61,31 @@ pub fn write_mapped_gltf(
     (binding, files): (MapBinding, &[String]),
     settings: impl Into<GlbSettings>,
 ) -> Result<usize, Error> {
-    let (path, source) = (path.as_ref(), source.as_ref());
-    let at_source = |fault: Fault| fault.at(source.display().to_string());
-    let bytes = read_bytes(source, MAX_BYTES);
-    let bytes = bytes.map_err(|e| cannot_read(source, e, "give the glTF file of the scene"))?;
-    let file_source = FileSource::in_folder(source.parent().unwrap_or(Path::new("")));
-    let container = Container::new(&bytes).map_err(at_source)?;
-    let document = container.document().map_err(at_source)?;
-    let buffers = Buffers::new(&container, &document, &file_source);
-    let nodes = Nodes::new(&document, scene).map_err(at_source)?;
-    let set_of = |material: Option<usize>| materials::coordinate_set(&document, material);
-    let geometry = Geometry::new(&document, &buffers, &nodes, &set_of);
-    let geometry = geometry.map_err(|(node, fault)| fault.at(node).inside(source))?;
-    let mut writer = Writer {
-        document: &document,
-        reader: MeshReader::new(&document, &buffers, &nodes, &set_of),
-        places: places(map),
-        map,
-        binding,
-        files,
-        textures: vec![],
-        materials: FxHashMap::default(),
-        used: FxHashSet::default(),
-        is_placed: nodes.is_placed(),
-        new: Additions::new(&container, &document).map_err(at_source)?,
-    };
-    writer
-        .add_textures(&settings.into())
-        .map_err(|e| cannot_write(path, std::io::Error::other(e)))?;
-    let mut instances = 0;
-    for (number, group) in (0u32..).zip(&geometry.places) {
-        if group.is_instance {
-            instances += 1;
-        } else {
-            writer.map_node(number, group).map_err(at_source)?;
+    let path = path.as_ref();
+    rewritten(path, source.as_ref(), scene, |source, new| {
+        let mut writer = Writer {
+            source: &source,
+            places: places(map),
+            map,
+            binding,
+            files,
+            textures: vec![],
+            materials: FxHashMap::default(),
+            used: FxHashSet::default(),
+            new,
+        };
+        let textures = writer.add_textures(&settings.into());
+        textures.map_err(|e| cannot_write(path, std::io::Error::other(e)))?;
+        let mut instances = 0;
+        for (number, group) in (0u32..).zip(source.groups) {
+            if group.is_instance {
+                instances += 1;
+            } else {
+                writer.map_node(number, group).map_err(|fault| source.error(fault))?;
+            }
         }
-    }
-    writer.new.write(path, &container, &document)?;
-    Ok(instances)
+        Ok(instances)
+    })
 }
 
 /// Three corners in any order, and the group of their triangle.
@@ -139,8 +123,7 @@ struct PagePart {
 }
 
 struct Writer<'a, 'b> {
-    document: &'a Document,
-    reader: MeshReader<'a, 'b>,
+    source: &'a Source<'a, 'b>,
     places: FxHashMap<Corners, usize>,
     map: &'a LightMap,
     binding: MapBinding,
@@ -151,8 +134,7 @@ struct Writer<'a, 'b> {
     materials: FxHashMap<(Option<usize>, usize, usize), usize>,
     /// Meshes of the source that a node has taken for its own.
     used: FxHashSet<usize>,
-    is_placed: Vec<bool>,
-    new: Additions,
+    new: &'a mut Additions,
 }
 
 impl Writer<'_, '_> {
@@ -194,14 +176,14 @@ impl Writer<'_, '_> {
 
     /// Gives the mesh of a node its places in the map.
     fn map_node(&mut self, number: u32, group: &Group) -> Result<(), Fault> {
-        let node = &self.document.nodes[group.node];
+        let node = &self.source.document.nodes[group.node];
         let Some(mesh) = node.mesh else { return Ok(()) };
         let mut primitives = vec![];
-        for (k, primitive) in self.document.meshes[mesh].primitives.iter().enumerate() {
+        for (k, primitive) in self.source.document.meshes[mesh].primitives.iter().enumerate() {
             let old = self.old_primitive(mesh, k);
             let is_mapped = primitive.mode.is_none_or(|mode| (4..=6).contains(&mode));
             let positions = match is_mapped {
-                true => self.reader.posed_vertices(node, mesh, primitive)?,
+                true => self.source.reader.posed_vertices(node, mesh, primitive)?,
                 false => None,
             };
             match positions {
@@ -215,7 +197,7 @@ impl Writer<'_, '_> {
                 }
             }
         }
-        let is_shared = has_other_users(self.document, &self.is_placed, mesh);
+        let is_shared = has_other_users(self.source.document, &self.source.is_placed, mesh);
         if self.used.insert(mesh) && !is_shared {
             self.new.json["meshes"][mesh]["primitives"] = json!(primitives);
         } else {
@@ -240,7 +222,7 @@ impl Writer<'_, '_> {
         primitive: &Primitive,
         positions: &[DVec3],
     ) -> Result<Vec<(usize, PagePart)>, Fault> {
-        let indices = primitive.indices.map(|k| self.reader.values(k)).transpose()?;
+        let indices = primitive.indices.map(|k| self.source.reader.values(k)).transpose()?;
         let count = indices.as_ref().map_or(positions.len(), Values::count);
         let triangles = triangles_of(primitive.mode, count)?;
         check_number(triangles.len())?;
@@ -348,7 +330,7 @@ impl Writer<'_, '_> {
         vertices: &[PlacedVertex],
         has_range: bool,
     ) -> Result<usize, Fault> {
-        let values = self.reader.values(accessor)?;
+        let values = self.source.reader.values(accessor)?;
         let stride = values.item_bytes().next_multiple_of(4);
         let mut bytes = Vec::with_capacity(stride * vertices.len());
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -360,7 +342,7 @@ impl Writer<'_, '_> {
             }
         }
         let view = self.new.view(&bytes, Some(stride), Some(ARRAY_BUFFER));
-        let of = &self.document.accessors[accessor];
+        let of = &self.source.document.accessors[accessor];
         let mut new = json!({
             "bufferView": view, "componentType": of.component_type, "count": vertices.len(),
             "type": of.kind,
