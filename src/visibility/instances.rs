@@ -349,8 +349,9 @@ mod tests {
                         (wanted.triangle, wanted.front),
                         "{k} {d}"
                     );
-                    // Both are off their planes by some 16 roundings of coordinates, which are up to
-                    // four times those of the scene, and count for more the more slanted the ray.
+                    // Both are off their planes by some 16 roundings of coordinates, which are up
+                    // to four times those of the scene, and count for more the more slanted the
+                    // ray.
                     let cosine = (scene.normal(hit.triangle).dot(d) / d.length()).abs();
                     let [a, b, c] = scene.corners(hit.triangle);
                     let at = |hit: Hit| hit.u * (b - a) + hit.v * (c - a);

@@ -309,8 +309,8 @@ impl RayScene {
         blocked
     }
 
-    /// The triangles of `scene`, stored once for groups that are images of one another; `None` where
-    /// there are few of these.
+    /// The triangles of `scene`, stored once for groups that are images of one another; `None`
+    /// where there are few of these.
     #[cfg(test)]
     pub fn of_instances(scene: &Scene) -> Option<RayScene> {
         let rays = RayScene::with_instances(scene, |_| true, 1);
