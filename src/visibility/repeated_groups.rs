@@ -19,7 +19,8 @@ use rustc_hash::{FxHashMap, FxHasher};
 
 use crate::scene::Scene;
 
-/// Fewest triangles of a group that is worth a ray's way to another frame. Plain choice.
+/// Fewest triangles of a group that is worth a ray's way to another frame: an instance takes as much
+/// memory as one. Plain choice.
 const MIN_TRIANGLES: usize = 8;
 
 /// Shapes that a group is compared with, at most, of those whose [`affine_invariant`] is next above
@@ -30,6 +31,9 @@ const MAX_COMPARED: usize = 2;
 /// rounded when an object is placed, twice, and four of them determine the map. Far below 64 steps,
 /// within which surfaces are in contact (see [`offset`](super::offset)).
 const TOLERANCE: f64 = 8.0;
+
+/// Thickness of a shape over its length: its corners' rounding tilts thinner ones. Plain choice.
+const MIN_THICKNESS: f64 = 1e-3;
 
 /// Groups that are images of one another.
 #[derive(Debug, Default)]
@@ -65,8 +69,8 @@ struct Shape {
 }
 
 impl RepeatedGroups {
-    /// The repeated groups among the `included` triangles of `scene`, those whose backs are
-    /// `covered` apart.
+    /// The repeated groups of `scene` all of whose triangles are `included`; of the others those
+    /// triangles that are.
     pub fn of_scene(scene: &Scene, included: impl Fn(usize) -> bool) -> RepeatedGroups {
         let mut shapes: Vec<Shape> = vec![];
         let mut known: FxHashMap<u64, BTreeSet<(u64, usize)>> = FxHashMap::default();
@@ -128,7 +132,8 @@ impl RepeatedGroups {
     }
 }
 
-/// The same for groups whose triangles have corners in common alike, and alike covered backs.
+/// A hash that is the same for groups whose triangles share corners alike and have alike covered
+/// backs.
 fn topology(scene: &Scene, triangles: &Range<usize>) -> u64 {
     let mut hasher = FxHasher::default();
     let base = scene.triangles()[triangles.start].corners[0];
@@ -171,9 +176,8 @@ impl Shape {
         let d = furthest(&|p| normal.dot(p - a).abs())?;
         let corners = [(0, 0), b, c, d];
         let matrix = steps(corners.map(of));
-        // Thinner than this, rounding of its corners tilts it.
         let thickness = normal.normalize_or_zero().dot(of(d) - a).abs();
-        let is_thick = thickness > 1e-3 * along.length();
+        let is_thick = thickness > MIN_THICKNESS * along.length();
         let inverse = matrix.inverse();
         (is_thick && inverse.is_finite()).then_some(Shape {
             triangles,
