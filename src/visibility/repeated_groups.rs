@@ -19,8 +19,8 @@ use rustc_hash::{FxHashMap, FxHasher};
 
 use crate::scene::Scene;
 
-/// Fewest triangles of a group that is worth a ray's way to another frame: an instance takes as much
-/// memory as one. Plain choice.
+/// Fewest triangles of a group that is worth a ray's way to another frame: an instance takes as
+/// much memory as one. Plain choice.
 const MIN_TRIANGLES: usize = 8;
 
 /// Shapes that a group is compared with, at most, of those whose [`affine_invariant`] is next above
