@@ -172,7 +172,7 @@ impl KeptVertices {
         };
         extrapolate_into_buried(&mut samples);
         let (mesh, reflected) = (samples.mesh.clone(), samples.reflected.clone());
-        let error = samples.noise.clone();
+        let error = std::mem::take(&mut samples.noise);
         let (surface, corners) = samples.into_vertex_mesh();
         GatheredMesh {
             surface: VertexMesh { error, ..surface },

@@ -18,7 +18,7 @@ use super::ray32::{LocalUnit, Ray32};
 use super::repeated_groups::RepeatedGroups;
 use super::sah_tree::{Aabb32, SahTree};
 use super::triangle_bvh::{Stream, TriangleBvh, end_of};
-use super::triangle_plane::TrianglePlane;
+use super::triangle_plane::{LocalRay, TrianglePlane};
 use super::triangle_tree::TriangleTree;
 use super::wide_bvh::{Child, Visit, WideBvh};
 use crate::geometry::aabb::Aabb;
@@ -38,7 +38,7 @@ pub(super) struct Instances {
 }
 
 /// An image of a shape.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Instance {
     shape: usize,
     /// Index of its first triangle.
@@ -47,19 +47,10 @@ struct Instance {
     to_shape: DAffine3,
 }
 
-/// A ray in the frame of an instance.
-#[derive(Clone, Copy)]
-pub(super) struct InstanceRay {
-    pub from: DVec3,
-    pub direction: DVec3,
-    /// What is added to the index of a triangle of the shape.
-    pub first: u32,
-}
-
 impl Instance {
     #[inline(always)]
-    fn ray(&self, from: DVec3, direction: DVec3) -> InstanceRay {
-        InstanceRay {
+    fn ray(&self, from: DVec3, direction: DVec3) -> LocalRay {
+        LocalRay {
             from: self.to_shape.transform_point3(from),
             direction: self.to_shape.transform_vector3(direction),
             first: self.first,
@@ -113,7 +104,7 @@ impl Instances {
         simd: S,
         (from, direction): (DVec3, DVec3),
         reach: Range<f64>,
-        mut meet: impl FnMut(&TrianglePlane, InstanceRay) -> Option<f64>,
+        mut meet: impl FnMut(&TrianglePlane, LocalRay) -> Option<f64>,
     ) {
         let (mut ray, length) = self.unit.ray(from, direction, reach.clone());
         let visitor = &mut AtInstances {
@@ -124,30 +115,28 @@ impl Instances {
             start: reach.start,
             ends: &mut [reach.end],
             buffers: None,
-            meet: |_: usize, plane: &TrianglePlane, ray: InstanceRay| meet(plane, ray),
+            meet: |_: usize, plane: &TrianglePlane, ray: LocalRay| meet(plane, ray),
         };
         self.bvh.trace(simd, Child::ROOT, (0, &mut ray), visitor);
     }
 
-    /// The same for many `directions` from one point, further than `start` and no further than
-    /// `end` of their index; `meet` has that index.
+    /// The same for many `directions` from one point, further than `start` and no further than the
+    /// ends in the buffers; `meet` has the index of the direction.
     #[inline(always)]
     pub fn trace_stream<S: Simd>(
         &self,
         simd: S,
         (from, directions): (DVec3, &[DVec3]),
-        (start, end): (f64, impl Fn(usize) -> f64),
+        start: f64,
         StreamBuffers { rays, open, lengths, ends, local }: &mut StreamBuffers,
-        meet: impl FnMut(usize, &TrianglePlane, InstanceRay) -> Option<f64>,
+        meet: impl FnMut(usize, &TrianglePlane, LocalRay) -> Option<f64>,
     ) {
         rays.clear();
         lengths.clear();
-        ends.clear();
-        for (k, &direction) in directions.iter().enumerate() {
-            let (ray, length) = self.unit.ray(from, direction, start..end(k));
+        for (&direction, &end) in directions.iter().zip(&*ends) {
+            let (ray, length) = self.unit.ray(from, direction, start..end);
             rays.push(ray);
             lengths.push(length);
-            ends.push(end(k));
         }
         let buffers = Some(local);
         let visitor =
@@ -162,7 +151,8 @@ pub(super) struct StreamBuffers {
     rays: ArrayVec<Ray32, MAX_STREAM>,
     open: OpenChildren,
     lengths: ArrayVec<f64, MAX_STREAM>,
-    ends: ArrayVec<f64, MAX_STREAM>,
+    /// Where the rays end, in units of their directions.
+    pub ends: ArrayVec<f64, MAX_STREAM>,
     local: LocalStream,
 }
 
@@ -190,7 +180,7 @@ struct AtInstances<'a, F> {
     meet: F,
 }
 
-impl<F: FnMut(usize, &TrianglePlane, InstanceRay) -> Option<f64>> AtInstances<'_, F> {
+impl<F: FnMut(usize, &TrianglePlane, LocalRay) -> Option<f64>> AtInstances<'_, F> {
     /// A ray by its index at an instance.
     #[inline(always)]
     fn one<S: Simd>(&mut self, simd: S, instance: &Instance, index: usize) {
@@ -230,7 +220,7 @@ impl<F: FnMut(usize, &TrianglePlane, InstanceRay) -> Option<f64>> AtInstances<'_
             #[inline(always)]
             |ray, plane| {
                 let index = usize::from(active[ray]);
-                let local = InstanceRay { from, direction: local[ray], first: instance.first };
+                let local = LocalRay { from, direction: local[ray], first: instance.first };
                 ends[index] = meet(index, plane, local)?;
                 Some(ends[index])
             },
@@ -240,7 +230,7 @@ impl<F: FnMut(usize, &TrianglePlane, InstanceRay) -> Option<f64>> AtInstances<'_
 
 impl<S: Simd, F> Visit<S> for AtInstances<'_, F>
 where
-    F: FnMut(usize, &TrianglePlane, InstanceRay) -> Option<f64>,
+    F: FnMut(usize, &TrianglePlane, LocalRay) -> Option<f64>,
 {
     #[inline(always)]
     fn ray(&mut self, simd: S, leaf: usize, index: usize, ray: &mut Ray32) {

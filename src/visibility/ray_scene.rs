@@ -25,11 +25,12 @@ use crate::geometry::aabb::Aabb;
 use crate::scene::Scene;
 
 use super::cut_outs::CutOuts;
-use super::instances::{InstanceRay, Instances, StreamBuffers};
+use super::instances::{Instances, StreamBuffers};
 use super::ray_stream::{MAX_STREAM, OpenChildren};
 use super::ray32::Ray32;
 use super::repeated_groups::RepeatedGroups;
 use super::triangle_bvh::{self, TriangleBvh};
+use super::triangle_plane::{LocalRay, TrianglePlane};
 use super::triangle_tree::TriangleTree;
 
 pub(crate) use super::triangle_plane::Hit;
@@ -125,16 +126,14 @@ impl RayScene {
             false => RepeatedGroups::default(),
         };
         let has_repeats = groups.saved() >= min_saved.max(count / 2);
-        let tree = match has_repeats {
-            true => TriangleTree::new(groups.others.clone(), |t| scene.corners(t), &scene.bounds()),
-            false => TriangleTree::of_scene(scene, is_included),
+        let instances = has_repeats.then(|| Instances::new(scene, &groups));
+        let tree = match &instances {
+            Some(_) => TriangleTree::new(groups.others, |t| scene.corners(t), &scene.bounds()),
+            None => TriangleTree::of_scene(scene, is_included),
         };
-        RayScene {
-            instances: has_repeats.then(|| Instances::new(scene, &groups)),
-            ..RayScene::over(tree, |t| scene.corners(t))
-        }
-        .with_covered_backs(|t| scene.is_back_covered(t))
-        .with_cut_outs(CutOuts::new(scene, 0..count))
+        RayScene { instances, ..RayScene::over(tree, |t| scene.corners(t)) }
+            .with_covered_backs(|t| scene.is_back_covered(t))
+            .with_cut_outs(CutOuts::new(scene, 0..count))
     }
 
     /// The nearest hit along `direction` (any length) from `from`, further than `start` and not on
@@ -172,26 +171,37 @@ impl RayScene {
         ignored: Option<usize>,
         counts: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
-        let (ray, mut best): (_, Option<Hit>) = ((from, direction), None);
-        self.triangles.trace(simd, ray, start..f64::INFINITY, |plane| {
-            let hit = plane.nearer(ray, start, ignored, best)?;
-            if !self.is_solid(&hit) || !counts(&hit) {
-                return None;
-            }
-            best = Some(hit);
-            Some(hit.distance)
+        let mut best: Option<Hit> = None;
+        let ray = LocalRay { from, direction, first: 0 };
+        self.triangles.trace(simd, (from, direction), start..f64::INFINITY, |plane| {
+            self.meet(plane, ray, start, ignored, &counts, &mut best)
         });
         let Some(instances) = &self.instances else { return best };
-        let end = best.map_or(f64::INFINITY, |hit| hit.distance);
-        instances.trace(simd, ray, start..end, |plane, InstanceRay { from, direction, first }| {
-            let hit = plane.nearer_of((from, direction), start, ignored, best, first)?;
-            if !self.is_solid(&hit) || !counts(&hit) {
-                return None;
-            }
-            best = Some(hit);
-            Some(hit.distance)
+        let end = end_at(best);
+        instances.trace(simd, (from, direction), start..end, |plane, ray| {
+            self.meet(plane, ray, start, ignored, &counts, &mut best)
         });
         best
+    }
+
+    /// Puts the hit of a triangle in the place of the `best` so far if it is nearer and counts; its
+    /// distance then.
+    #[inline(always)]
+    fn meet(
+        &self,
+        plane: &TrianglePlane,
+        ray: LocalRay,
+        start: f64,
+        ignored: Option<usize>,
+        counts: impl Fn(&Hit) -> bool,
+        best: &mut Option<Hit>,
+    ) -> Option<f64> {
+        let hit = plane.nearer(ray, start, ignored, *best)?;
+        if !self.is_solid(&hit) || !counts(&hit) {
+            return None;
+        }
+        *best = Some(hit);
+        Some(hit.distance)
     }
 
     /// The same for many `directions` from one point, which is faster: calls `visit` with each
@@ -241,32 +251,19 @@ impl RayScene {
             triangle_bvh::Stream { rays, lengths, open },
             #[inline(always)]
             |ray, plane| {
-                let hit = plane.nearer((from, directions[ray]), start, ignored, hits[ray])?;
-                if !self.is_solid(&hit) {
-                    return None;
-                }
-                hits[ray] = Some(hit);
-                Some(hit.distance)
+                let there = LocalRay { from, direction: directions[ray], first: 0 };
+                self.meet(plane, there, start, ignored, |_| true, &mut hits[ray])
             },
         );
         let Some(instances) = &self.instances else { return };
-        let ends: ArrayVec<f64, MAX_STREAM> =
-            hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.distance)).collect();
+        at_instances.ends = hits.iter().map(|&hit| end_at(hit)).collect();
         instances.trace_stream(
             simd,
             (from, directions),
-            (start, |ray| ends[ray]),
+            start,
             at_instances,
             #[inline(always)]
-            |ray, plane, InstanceRay { from, direction, first }| {
-                let ray_there = (from, direction);
-                let hit = plane.nearer_of(ray_there, start, ignored, hits[ray], first)?;
-                if !self.is_solid(&hit) {
-                    return None;
-                }
-                hits[ray] = Some(hit);
-                Some(hit.distance)
-            },
+            |ray, plane, there| self.meet(plane, there, start, ignored, |_| true, &mut hits[ray]),
         );
     }
 
@@ -325,11 +322,16 @@ impl RayScene {
     }
 }
 
+/// Where a ray ends that has this nearest hit, in units of its direction.
+#[inline(always)]
+fn end_at(hit: Option<Hit>) -> f64 {
+    hit.map_or(f64::INFINITY, |hit| hit.distance)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Material, Rgb, Specular, Triangle};
-    use crate::visibility::triangle_plane::TrianglePlane;
 
     #[test]
     fn closest_hit_skips_ignored_triangle() {
@@ -427,7 +429,8 @@ mod tests {
                 let start = [0.0, 1e-9, -1e-3][k % 3];
                 let brute = |&direction: &DVec3| {
                     let nearer = |best, plane: &TrianglePlane| {
-                        plane.nearer((from, direction), start, None, best).or(best)
+                        let ray = LocalRay { from, direction, first: 0 };
+                        plane.nearer(ray, start, None, best).or(best)
                     };
                     rays.triangles.triangles.iter().fold(None, nearer)
                 };

@@ -31,6 +31,16 @@ pub(super) struct TrianglePlane {
     pub back_is_covered: bool,
 }
 
+/// A ray in the frame of a triangle.
+#[derive(Clone, Copy)]
+pub(super) struct LocalRay {
+    pub from: DVec3,
+    /// Of any length.
+    pub direction: DVec3,
+    /// What is added to the index of the triangle: several groups may have it.
+    pub first: u32,
+}
+
 impl TrianglePlane {
     pub fn new(triangle: u32, [a, b, c]: [DVec3; 3]) -> TrianglePlane {
         let (u, v) = (b - a, c - a);
@@ -76,23 +86,10 @@ impl TrianglePlane {
     #[inline(always)]
     pub fn nearer(
         &self,
-        (from, direction): (DVec3, DVec3),
+        LocalRay { from, direction, first }: LocalRay,
         start: f64,
         ignored: Option<usize>,
         best: Option<Hit>,
-    ) -> Option<Hit> {
-        self.nearer_of((from, direction), start, ignored, best, 0)
-    }
-
-    /// The same of a triangle whose index is greater by `first`.
-    #[inline(always)]
-    pub fn nearer_of(
-        &self,
-        (from, direction): (DVec3, DVec3),
-        start: f64,
-        ignored: Option<usize>,
-        best: Option<Hit>,
-        first: u32,
     ) -> Option<Hit> {
         if Some((self.triangle + first) as usize) == ignored {
             return None;

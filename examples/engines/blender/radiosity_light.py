@@ -220,6 +220,11 @@ def light_vertices(program, scene, stem, options):
     print(f"radiosity: light on {lit} objects, {missing} corners without")
 
 
+def unnumbered(name):
+    """A name without the number that Blender gives it where it is taken."""
+    return name[:-4] if name[-4:-3] == "." else name
+
+
 def light_by_map(program, scene, stem, options):
     """Bakes a light map, and shows copies of the objects by it."""
     subprocess.run(
@@ -239,8 +244,7 @@ def light_by_map(program, scene, stem, options):
         item.hide_set(True)
     bpy.ops.import_scene.gltf(filepath=stem + ".glb")
     imported = [item for item in bpy.data.objects if item not in before]
-    original = {m: m.name.rsplit(".", 1)[0] if m.name[-4:-3] == "." else m.name
-                for m in bpy.data.materials if m not in materials}
+    original = {m: unnumbered(m.name) for m in bpy.data.materials if m not in materials}
     collection = bpy.data.collections.new("radiosity")
     bpy.context.scene.collection.children.link(collection)
     images, lit = {}, 0
@@ -248,9 +252,8 @@ def light_by_map(program, scene, stem, options):
         for other in item.users_collection:
             other.objects.unlink(item)
         collection.objects.link(item)
-        name = item.name[:-4] if item.name[-4:-3] == "." else item.name
         for slot in item.material_slots if item.type == "MESH" else ():
-            found = maps.get((name, original.get(slot.material)))
+            found = maps.get((unnumbered(item.name), original.get(slot.material)))
             if found is None:
                 continue
             file, number = found
