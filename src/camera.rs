@@ -177,7 +177,7 @@ impl PrimaryRays<'_> {
             None => Arc::new(RayScene::new(surface.faces.iter().map(corners))),
         };
         let [right, up, forward] = camera.frame();
-        let tangent = (camera.vertical_fov.to_radians() / 2.0).tan();
+        let tangent = libm::tan(camera.vertical_fov.to_radians() / 2.0);
         let step = 2.0 * tangent / f64::from(height) / f64::from(samples);
         let (right, down) = (right * step, -up * step);
         let half = |pixels: u32| f64::from(pixels) * f64::from(samples) / 2.0;

@@ -77,7 +77,7 @@ impl Glare {
     /// UGR; none without a source in view, or in the dark.
     pub fn rating(&self) -> Option<f64> {
         let sum: f64 = self.sources.iter().map(GlareSource::term).sum();
-        let rating = 8.0 * (0.25 / self.background.luminance * sum).log10();
+        let rating = 8.0 * libm::log10(0.25 / self.background.luminance * sum);
         (sum > 0.0).then_some(rating).filter(|rating| rating.is_finite())
     }
 

@@ -148,6 +148,39 @@ impl MeasuringGrid {
         Ok(Some(MeasuredGrid { grid: self.clone(), values, mean_error }))
     }
 
+    /// Measures all `grids` until gathering alone leaves less than a quarter of the share `error` of
+    /// their values, so that [`MeasuredGrid::correct`] has most of it: `gatherers` make one of a
+    /// noise, such as [`Backend::gather_to_noise`](crate::Backend::gather_to_noise). `progress` and
+    /// `None` are those of [`MeasuringGrid::measure`].
+    ///
+    /// # Errors
+    /// Those of [`MeasuringGrid::measure`], and of `gatherers`.
+    pub fn measure_to(
+        grids: &[MeasuringGrid],
+        light: &GatheredMesh,
+        gatherers: &mut dyn FnMut(f64) -> Result<Box<dyn Gather>, Error>,
+        error: f64,
+        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Option<Vec<MeasuredGrid>>, Error> {
+        let mut all: Vec<Option<MeasuredGrid>> = vec![None; grids.len()];
+        // Half the noise four times: with more rays where gathering would take most of the error.
+        for share in [0.25, 0.125, 0.0625, 0.03125] {
+            let is_noisy = |measured: &MeasuredGrid| measured.relative_error() >= 0.25 * error;
+            let open: Vec<usize> =
+                (0..grids.len()).filter(|&k| all[k].as_ref().is_none_or(is_noisy)).collect();
+            if open.is_empty() {
+                break;
+            }
+            let mut gatherer = gatherers((share * error).min(1.0))?;
+            for k in open {
+                let measured = grids[k].measure(light, &mut *gatherer, &mut progress)?;
+                let Some(measured) = measured else { return Ok(None) };
+                all[k] = Some(measured);
+            }
+        }
+        Ok(Some(all.into_iter().flatten().collect()))
+    }
+
     /// The points as they gather.
     ///
     /// # Errors

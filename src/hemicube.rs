@@ -45,7 +45,7 @@ impl Frame {
     /// The frame of unit `normal`, turned about it by `angle` (radians) from a fixed start.
     pub fn new(normal: DVec3, angle: f64) -> Frame {
         let (x, y) = normal.any_orthonormal_pair();
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         // any_orthonormal_pair gives x × y = normal.
         Frame { tangent: x * cos + y * sin, bitangent: y * cos - x * sin, normal }
     }
@@ -95,14 +95,14 @@ impl Face {
 /// its density, 1/(π(x²+y²+1)²)).
 fn top_corner(x: f64, y: f64) -> f64 {
     let (a, b) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
-    (x / a * (y / a).atan() + y / b * (x / b).atan()) / (2.0 * PI)
+    (x / a * libm::atan(y / a) + y / b * libm::atan(x / b)) / (2.0 * PI)
 }
 
 /// Integral of the side-face density z/(π(y²+z²+1)²) (Cohen and Greenberg 1985) over the part
 /// of the face between its base line's middle and (y, z), up to a function of y alone.
 fn side_corner(y: f64, z: f64) -> f64 {
     let r = (1.0 + z * z).sqrt();
-    -(y / r).atan() / (2.0 * PI * r)
+    -libm::atan(y / r) / (2.0 * PI * r)
 }
 
 /// Exact delta form factor of every pixel of a hemicube of resolution `n`: the integral of the

@@ -1,6 +1,9 @@
 //! Input and output files. No other module of the library opens one, except for saved solver
 //! states.
 //!
+//! Functions that read take an [`Input`], a path or bytes under a name; those that write take an
+//! [`Output`], a path or a writer.
+//!
 //! | format | function | content |
 //! |---|---|---|
 //! | glTF 2.0 (feature `glb`) | [`load_scene`], [`read_scene`], [`SceneSettings`] | a scene |
@@ -27,6 +30,7 @@ mod given;
 mod glb;
 #[cfg(feature = "glb")]
 mod gltf;
+mod input;
 #[cfg(feature = "light-map")]
 mod ktx2;
 mod lights;
@@ -35,6 +39,7 @@ mod mtl;
 #[cfg(feature = "npz")]
 mod npz;
 mod obj;
+mod output;
 mod photometry;
 mod ply;
 mod ply_bands;
@@ -52,12 +57,6 @@ mod text;
 mod textures;
 mod tone;
 pub mod view_factors;
-
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::Path;
-
-use crate::error::{Error, ErrorKind};
 
 #[cfg(feature = "exr")]
 pub use self::exr::write_exr;
@@ -77,11 +76,13 @@ pub use self::ktx2::write_light_map_ktx2;
 pub use self::png::{write_png, write_png_with_tone};
 #[cfg(all(feature = "png", feature = "light-map"))]
 pub use self::rgbm::{rgbm_range, write_light_map_rgbm};
-pub use epw::{Weather, WeatherRecord, epw_from_text, read_epw};
+pub use epw::{Weather, WeatherRecord, read_epw};
 pub use files::read_text;
+pub use input::Input;
 #[cfg(feature = "npz")]
-pub use npz::{npz_from_bytes, read_npz, write_npz};
-pub use photometry::{Photometry, PhotometrySettings, photometry_from_bytes, read_photometry};
+pub use npz::{read_npz, write_npz};
+pub use output::Output;
+pub use photometry::{Photometry, PhotometrySettings, read_photometry};
 pub use ply::{write_ply, write_ply_with_tone};
 pub use ply_bands::write_ply_bands;
 pub use ply_reader::read_ply;
@@ -92,25 +93,3 @@ pub use settings::{ObjSettings, load_obj, read_obj};
 pub use settings::{SceneSettings, load_scene, read_scene};
 pub use specular::SpecularSurfaces;
 pub use tone::ToneCurve;
-
-/// Creates `path` and passes it to `write`; any failure names the file.
-fn write_file(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> Result<(), Error> {
-    let file = File::create(path).map_err(|e| cannot_write(path, e))?;
-    let mut out = BufWriter::new(file);
-    write(&mut out).and_then(|()| out.flush()).map_err(|e| cannot_write(path, e))
-}
-
-fn cannot_read(path: &Path, e: std::io::Error, remedy: &str) -> Error {
-    let found = format!("cannot be read: {e}");
-    Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-}
-
-fn cannot_write(path: &Path, e: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
-    let e = e.into();
-    let found = format!("cannot be written: {e}");
-    let remedy = "choose a folder that exists, can be written and has room";
-    Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-}

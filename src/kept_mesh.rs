@@ -9,7 +9,6 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use rustc_hash::FxHashSet;
@@ -21,6 +20,7 @@ use crate::gather::GatheredMesh;
 use crate::gather::kept_mesh::KeptVertices;
 use crate::mesh::Mesh;
 use crate::path_correction::{GatheredPoint, SurfaceGoal, correct_surface, scales};
+use crate::progress::Instant;
 use crate::scene::{Rgb, Scene};
 use crate::vertex::VertexMesh;
 use crate::visibility::lit_sides;
@@ -115,7 +115,7 @@ impl BakeResult {
         };
         if let Some(found) = found {
             for (k, &v) in open.iter().enumerate() {
-                let noise = kept.sample(v).noise.hypot(found.standard_error[k]);
+                let noise = libm::hypot(kept.sample(v).noise, found.standard_error[k]);
                 kept.set(v, found.irradiance[k], noise);
             }
         }

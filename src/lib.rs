@@ -101,6 +101,8 @@
 //! polarisation, time. Light leaves and arrives diffusely, passes clear glass straight on, and an
 //! emitter is a surface, a luminaire or the light from outside. Pictures show mirrors and glass.
 
+// The same bytes on every platform: see clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 // Hemicube geometry and some queries of meshes are used by the GPU passes only.
 #![cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "hemicubes are drawn on a GPU"))]
 

@@ -169,7 +169,7 @@ impl Mesh {
             .clone()
             .map(|t| {
                 // Rounding must not cost a level where the edge is a power of two times the size.
-                let splits = (longest(t) / element_size * (1.0 - 1e-12)).log2().ceil();
+                let splits = libm::log2(longest(t) / element_size * (1.0 - 1e-12)).ceil();
                 splits.clamp(0.0, 64.0) as u32
             })
             .collect();

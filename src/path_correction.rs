@@ -100,7 +100,8 @@ pub fn correct_by_paths(
         values[point].standard_error = (noise[k] + variance).map(f64::sqrt);
     }
     let of_gathers = noise.iter().sum::<Rgb>() / (open.len() as f64).max(1.0).powi(2);
-    correction.mean_error = (correction.mean_error.powf(2.0) + of_gathers).map(f64::sqrt);
+    correction.mean_error =
+        (correction.mean_error * correction.mean_error + of_gathers).map(f64::sqrt);
     Ok(Some(correction))
 }
 
@@ -265,7 +266,7 @@ fn origins(values: &[NoisyValue], scales: &[f64]) -> Vec<PathOrigin> {
 /// three from the others (Smyth 2004, equation 7).
 fn moderate(values: &[PointIrradiance]) -> Vec<Rgb> {
     let square = |v: &PointIrradiance| v.irradiance.length_squared().max(f64::MIN_POSITIVE);
-    let octave = |v: &PointIrradiance| (0.5 * square(v).log2()).floor() as i64;
+    let octave = |v: &PointIrradiance| (0.5 * libm::log2(square(v))).floor() as i64;
     let variance = |v: &PointIrradiance| v.standard_error * v.standard_error;
     let mut octaves = FxHashMap::<i64, (f64, Rgb)>::default();
     for value in values {

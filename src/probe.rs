@@ -163,7 +163,7 @@ pub fn correct_probes(
         }
         // The mean over the sphere of |Σ c_i Y_i|².
         let square = missed.variance.iter().sum::<f64>() / (4.0 * PI);
-        *deviation = deviation.hypot(square.sqrt());
+        *deviation = libm::hypot(*deviation, square.sqrt());
     }
     Ok(Some(correction))
 }

@@ -11,7 +11,10 @@
 //! ```
 
 use std::fmt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+/// The clock of the library: that of the platform, in browsers `performance.now()`.
+pub(crate) use web_time::Instant;
 
 /// Why a solve or a gather stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

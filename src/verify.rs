@@ -23,11 +23,11 @@ mod surfaces;
 mod verification;
 
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 pub use crate::accuracy::Estimate;
 use crate::error::{Error, ErrorKind};
 pub use crate::light::{PathTracer, Reflected, SurfacePoint};
+use crate::progress::Instant;
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
 use crate::visibility::lit_sides::is_resolved;

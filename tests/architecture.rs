@@ -51,7 +51,10 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "accuracy backend bake error gather geometry mesh path_correction progress sampling scene \
          vertex visibility",
     ),
-    ("kept_mesh", "backend bake error gather mesh path_correction scene vertex visibility"),
+    (
+        "kept_mesh",
+        "backend bake error gather mesh path_correction progress scene vertex visibility",
+    ),
     ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
 ];
 
@@ -152,6 +155,17 @@ fn files_are_opened_by_io_and_checkpoints_only() {
     for (file, code) in library() {
         let may = file.starts_with("io") || file == "solver/checkpoint.rs";
         assert!(may || !code.contains("std::fs"), "src/{file} opens files");
+    }
+}
+
+/// Of the standard library it panics in browsers.
+#[test]
+fn the_clock_is_named_in_one_module_only() {
+    for (file, code) in library() {
+        let reads = ["Instant,", "Instant;", "Instant}", "SystemTime"];
+        let reads = reads.iter().any(|name| code.contains(&format!("std::time::{name}")));
+        let reads = reads || code.contains("std::time::{Duration, Instant}");
+        assert!(!reads, "src/{file} reads a clock: take crate::progress::Instant");
     }
 }
 

@@ -1,7 +1,5 @@
 //! Rows of either backend behind one type, with the time spent on them.
 
-use std::time::Instant;
-
 use super::cpu::RayRows;
 #[cfg(feature = "gpu")]
 use super::gpu::{HemicubeRows, TracedRows};
@@ -9,7 +7,7 @@ use super::row_maker::RowMaker;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::{Mesh, NodeId};
-use crate::progress::Timings;
+use crate::progress::{Instant, Timings};
 
 /// Form-factor rows of a [`crate::Backend`], made by [`crate::Backend::rows`].
 #[derive(Debug)]

@@ -2,7 +2,8 @@
 
 use crate::bake::error_estimate::{ErrorEstimate, GroupError};
 use crate::bake::model;
-use std::time::{Duration, Instant};
+use crate::progress::Instant;
+use std::time::Duration;
 
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
 
@@ -164,7 +165,7 @@ pub(super) fn with_rays_for(
     let mut chosen = gather.clone();
     // They come in powers of two.
     let rays = rays.max(model::min_rays(vertices)).min(*model::RAYS.end());
-    chosen.rays = 1 << rays.log2().round() as u32;
+    chosen.rays = 1 << libm::log2(rays).round() as u32;
     chosen.noise_tolerance = noise_tolerance(target);
     chosen
 }
@@ -196,7 +197,7 @@ pub(super) fn refined(
         // What is uncertain may be an error of the elements too.
         let ErrorEstimate { total, sources, .. } = group.estimate;
         let uncertain = (cautious(&group.estimate).powi(2) - total.powi(2)).sqrt();
-        let missed = sources.hypot(uncertain);
+        let missed = libm::hypot(sources, uncertain);
         let own = Steps::to(&with_sources_in_mesh(&group.estimate, missed), allowed);
         steps = steps.both(own);
         if let Some(step) = own.mesh {
@@ -229,7 +230,7 @@ pub(super) fn with_bounces(
 ) -> GatherSettings {
     let needs_bounces = |estimate: &ErrorEstimate| {
         let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
-        let (bounces, rest) = (truncation.hypot(unshot), mesh.hypot(sampling));
+        let (bounces, rest) = (libm::hypot(truncation, unshot), libm::hypot(mesh, sampling));
         let allowed = model::allowed_error(target.error);
         bounces > model::water_filling_cap([bounces], rest, allowed)
     };
@@ -244,7 +245,7 @@ pub(super) fn with_bounces(
 /// `estimate` with the `sources` added to the error of the mesh: all bounces are counted, so that
 /// elements are the cause.
 fn with_sources_in_mesh(estimate: &ErrorEstimate, sources: f64) -> ErrorEstimate {
-    ErrorEstimate { mesh: estimate.mesh.hypot(sources), ..*estimate }
+    ErrorEstimate { mesh: libm::hypot(estimate.mesh, sources), ..*estimate }
 }
 
 /// By how much settings are to be refined.
@@ -262,7 +263,7 @@ impl Steps {
     /// What brings `estimate` to `allowed`. A further bounce shoots what was left unshot, too.
     fn to(estimate: &ErrorEstimate, allowed: f64) -> Steps {
         let ErrorEstimate { sampling, mesh, truncation, unshot, .. } = *estimate;
-        let bounces = truncation.hypot(unshot);
+        let bounces = libm::hypot(truncation, unshot);
         let cap = |bounces: f64, lowers_sampling: bool| match lowers_sampling {
             true => model::water_filling_cap([sampling, mesh, bounces], 0.0, allowed),
             false => model::water_filling_cap([mesh, bounces], sampling, allowed),

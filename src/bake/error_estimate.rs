@@ -70,7 +70,7 @@ impl ErrorEstimate {
     /// What is left of it for whatever gathers this light anew, as texels do: truncation, unshot
     /// light and sources, about; none of these is made less by finer places.
     pub fn of_light(&self) -> f64 {
-        self.truncation.hypot(self.unshot).hypot(self.sources)
+        libm::hypot(libm::hypot(self.truncation, self.unshot), self.sources)
     }
 
     /// That of `samples` points alone: by the rays that gathered there and by the paths, so many,
@@ -81,7 +81,7 @@ impl ErrorEstimate {
         sources: f64,
         paths: usize,
     ) -> ErrorEstimate {
-        let total = sampling.hypot(sources);
+        let total = libm::hypot(sampling, sources);
         ErrorEstimate { total, sampling, sources, samples, paths, ..ErrorEstimate::default() }
     }
 }
@@ -481,7 +481,7 @@ fn passed_share(observations: &[Observation], conditions: &Conditions) -> f64 {
     let escaped = observations.iter().map(|o| o.escaped).sum::<f64>();
     let escaped = escaped / observations.len().max(1) as f64;
     match conditions.bounces {
-        Some(bounces) => (conditions.mean_albedo * (1.0 - escaped)).powf(bounces),
+        Some(bounces) => libm::pow(conditions.mean_albedo * (1.0 - escaped), bounces),
         None => 1.0,
     }
 }

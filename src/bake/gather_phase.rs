@@ -14,7 +14,6 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::accuracy::Measure;
 use crate::backend::cpu::RayGather;
@@ -36,7 +35,7 @@ use crate::gather::point_row::PointRows;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::light::PathTracer;
 use crate::mesh::Mesh;
-use crate::progress::StopReason;
+use crate::progress::{Instant, StopReason};
 use crate::sampling::octaves::Octaves;
 use crate::scene::Rgb;
 use crate::verify::octaves_of;

@@ -11,7 +11,7 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::backend::Backend;
 use crate::bake::controller::{ErrorTarget, TargetErrors, Within};
@@ -22,6 +22,7 @@ use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
 use crate::bake::to_error::{check_error, settings_for};
 use crate::error::Error;
+use crate::progress::Instant;
 use crate::scene::Scene;
 
 /// The error that a bake within a time goes to first.

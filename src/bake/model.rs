@@ -192,12 +192,12 @@ pub(super) fn leaves_budget(fixed: f64, allowed: f64) -> bool {
 
 /// Factor of the number of vertices for the error of the mesh to fall from `error` to `cap`.
 pub(super) fn vertex_growth(error: f64, cap: f64) -> f64 {
-    (error / cap).max(1.0).powf(VERTEX_EXPONENT)
+    libm::pow((error / cap).max(1.0), VERTEX_EXPONENT)
 }
 
 /// Factor of the rays for sampling to fall from `error` to `allowed`.
 pub(super) fn ray_factor(error: f64, allowed: f64) -> f64 {
-    (error / allowed).powf(1.0 / RQMC_EXPONENT)
+    libm::pow(error / allowed, 1.0 / RQMC_EXPONENT)
 }
 
 /// Factor of the rays in a round, for sampling to fall from `error` to `cap`: at most 8.

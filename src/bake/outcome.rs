@@ -48,7 +48,7 @@ impl Obstacle {
         let parts = [
             (mesh, Obstacle::Edges),
             (sampling, Obstacle::Rays),
-            (truncation.hypot(unshot), Obstacle::Bounces),
+            (libm::hypot(truncation, unshot), Obstacle::Bounces),
             (sources, Obstacle::Sources),
         ];
         let largest = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));

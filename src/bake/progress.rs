@@ -1,13 +1,12 @@
 //! Progress of a bake, and wall time by stage.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use crate::bake::error_estimate::ErrorEstimate;
 use crate::bake::fallback::ResilientBackend;
 use crate::error::Error;
 use crate::gather::Progress as GatherProgress;
-use crate::progress::{Timings, lap};
+use crate::progress::{Instant, Timings, lap};
 use crate::solver::Progress;
 
 /// The stage that a bake is at.

@@ -124,7 +124,7 @@ fn parts(above: &SurfaceOffset, mesh: &Mesh, node: NodeId, luminaires: &[&Lumina
     }
     let size = mesh.area(node).sqrt();
     let of_part = |(middle, cuts): (DVec3, u32)| {
-        let size = size / f64::from(cuts).exp2();
+        let size = size / libm::exp2(f64::from(cuts));
         Part { point: above.gather_point(middle, normal, size), share: 0.25f64.powi(cuts as i32) }
     };
     middles.into_iter().map(of_part).collect()

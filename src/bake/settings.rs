@@ -196,7 +196,7 @@ impl BakeSettings {
         };
         let mut solve = SolveSettings {
             // Error ∝ edge^2.5, and edge = 0.6 of the diagonal times the error where that is more.
-            element_size: diagonal * (0.105 * e.powf(0.4)).max(0.6 * e),
+            element_size: diagonal * (0.105 * libm::pow(e, 0.4)).max(0.6 * e),
             region: survey.region,
             gathered_materials: survey.gathered_materials.clone(),
             hemicube_resolution: model::hemicube_resolution(e),
@@ -217,17 +217,17 @@ impl BakeSettings {
             // By docs/data/mesh_error.tsv: at 10 % thirteen scenes meet the error at their first
             // estimate with 0.08 too, and take 0.7 of the time that 0.05 does; at 5 and 2 % two of
             // four need further rounds with 0.8 times the error, and none with 0.6 and 0.5 times.
-            mesh_error: 1.25 * e.powf(1.25),
+            mesh_error: 1.25 * libm::pow(e, 1.25),
             interpolation_tolerance: 0.5 * e,
             // A first gather of all vertices sees what was shot on elements.
             gather_passes: if e > 0.03 { 1 } else { 2 },
             region: survey.region,
             max_elements: model::max_elements(scene.triangles().len()),
-            ..RefinementSettings::new(0.1 * diagonal * e.powf(0.85))
+            ..RefinementSettings::new(0.1 * diagonal * libm::pow(e, 0.85))
         };
         let gather = GatherSettings {
             // Follows the error slowly: elements are split where light is not linear.
-            element_size: 0.3 * diagonal * e.powf(0.3),
+            element_size: 0.3 * diagonal * libm::pow(e, 0.3),
             // With 0 to 3 the Cornell box and two rooms are as exact, at 10, 5, 2 and 1 %.
             contact_levels: 1,
             // Until the pilot chooses.

@@ -10,7 +10,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::backend::RowMaker;
 use crate::bake::controller::ErrorTarget;
@@ -29,7 +29,7 @@ use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
-use crate::progress::StopReason;
+use crate::progress::{Instant, StopReason};
 use crate::scene::Scene;
 use crate::solver::{Progress, ReceivedLight, Solution, Solver};
 use crate::verify::octaves_of;

@@ -42,7 +42,7 @@ impl Lobe {
     fn at(&self, nm: f64) -> f64 {
         let &Lobe(height, top, below, above) = self;
         let t = (nm - top) / if nm < top { below } else { above };
-        height * (-0.5 * t * t).exp()
+        height * libm::exp(-0.5 * t * t)
     }
 
     /// Its integral over all wavelengths, nm: that of two halves of a Gaussian.

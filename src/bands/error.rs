@@ -21,7 +21,7 @@ pub struct BandError {
 
 impl BandError {
     pub(super) fn new(noise: f64, remainder: f64, of_bake: f64) -> BandError {
-        let total = noise.hypot(remainder).hypot(of_bake);
+        let total = libm::hypot(libm::hypot(noise, remainder), of_bake);
         BandError { total, noise, remainder, of_bake }
     }
 }

@@ -58,8 +58,8 @@ impl Framing<'_> {
         let across = |axis: &DVec3| axis.dot(self.up).abs() < 0.8;
         let first = [DVec3::NEG_Z, DVec3::Y].into_iter().find(across).unwrap_or(DVec3::X);
         let first = first.reject_from_normalized(self.up).normalize();
-        let (sine, cosine) = (turns * TAU).sin_cos();
-        let (down, level) = elevation.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(turns * TAU);
+        let (down, level) = libm::sincos(elevation.to_radians());
         (first * cosine + first.cross(self.up) * sine) * level - self.up * down
     }
 
@@ -72,7 +72,7 @@ impl Framing<'_> {
         let (target, up, vertical_fov) = (self.bounds.centre(), self.up, 40.0_f64);
         let camera = Camera { eye: -forward, target: DVec3::ZERO, up, vertical_fov };
         let [right, up, _] = camera.frame();
-        let half = (vertical_fov.to_radians() / 2.0).tan() * (1.0 - 2.0 * 0.04);
+        let half = libm::tan(vertical_fov.to_radians() / 2.0) * (1.0 - 2.0 * 0.04);
         let back = self.bounds.corners().map(|corner| {
             let [x, y, z] = [right, up, forward].map(|axis| (corner - target).dot(axis));
             (x / aspect).abs().max(y.abs()) / half - z
@@ -92,7 +92,7 @@ impl Framing<'_> {
         let seen = |point: DVec3| {
             let (count, mut fronts, mut backs) = (64, 0.0, 0.0);
             for [x, y] in (0..count).map(|k| r2_point(k, 0.5)) {
-                let direction = self.forward((2.0 * x - 1.0).asin().to_degrees(), y);
+                let direction = self.forward(libm::asin(2.0 * x - 1.0).to_degrees(), y);
                 if let Some(hit) = self.hit(point, direction) {
                     *(if hit.front { &mut fronts } else { &mut backs }) += 1.0 / count as f64;
                 }
@@ -120,7 +120,7 @@ impl Framing<'_> {
 
     /// The same view with rounded coordinates: steps below 1e-4 of the size of the box.
     fn rounded(&self, camera: Camera) -> Camera {
-        let digits = 4 - self.bounds.diagonal().log10().floor() as i32;
+        let digits = 4 - libm::log10(self.bounds.diagonal()).floor() as i32;
         let round = |x: f64| {
             let scale = 10f64.powi(digits.abs());
             if digits >= 0 { (x * scale).round() / scale } else { (x / scale).round() * scale }

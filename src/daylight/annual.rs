@@ -189,7 +189,7 @@ impl AnnualDaylight {
     /// Adds to errors how much the same by wider patches differs.
     fn add_width(&mut self, widened: &AnnualDaylight) {
         let add = |estimate: &mut Estimate, other: &Estimate| {
-            estimate.error = estimate.error.hypot(estimate.value - other.value);
+            estimate.error = libm::hypot(estimate.error, estimate.value - other.value);
         };
         add(&mut self.autonomy, &widened.autonomy);
         add(&mut self.continuous, &widened.continuous);

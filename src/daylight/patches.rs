@@ -44,12 +44,12 @@ impl Patches {
         if height < 0.0 {
             return None;
         }
-        let band = (height.min(1.0).asin() / BAND) as usize;
+        let band = (libm::asin(height.min(1.0)) / BAND) as usize;
         if band >= 2 * ROWS.len() {
             return Some(PATCHES - 1);
         }
         let [x, y] = self.axes.map(|axis| axis.dot(direction));
-        let turn = (y.atan2(x) / TAU).rem_euclid(1.0);
+        let turn = (libm::atan2(y, x) / TAU).rem_euclid(1.0);
         let across = 2 * ROWS[band / 2];
         Some(first(band) + ((turn * across as f64) as usize).min(across - 1))
     }
@@ -59,11 +59,11 @@ impl Patches {
         let mut all = vec![];
         let mut add = |patch, [low, high]: [f64; 2], across: usize, k: usize| {
             // The middle of the ring by area.
-            let sine = (low.sin() + high.sin()) / 2.0;
+            let sine = (libm::sin(low) + libm::sin(high)) / 2.0;
             let turn = TAU * (k as f64 + 0.5) / across as f64;
-            let level = turn.cos() * self.axes[0] + turn.sin() * self.axes[1];
+            let level = libm::cos(turn) * self.axes[0] + libm::sin(turn) * self.axes[1];
             let direction = (1.0 - sine * sine).sqrt() * level + sine * self.up;
-            let solid_angle = TAU / across as f64 * (high.sin() - low.sin());
+            let solid_angle = TAU / across as f64 * (libm::sin(high) - libm::sin(low));
             all.push(SkyDirection { patch, direction, solid_angle });
         };
         for half in 0..4 * ROWS.len() {

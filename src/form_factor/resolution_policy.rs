@@ -24,7 +24,7 @@ pub(crate) const MIN_HALVED_RESOLUTION: u32 = 16;
 /// `full_resolution_share` on: the largest that keeps it at or above N ∝ s^0.4.
 pub(crate) fn halvings_for_importance(weight: f64, full_resolution_share: f64) -> u32 {
     // Below 0, and where both are 0, none.
-    (0.4 * (full_resolution_share / weight).log2()) as u32
+    (0.4 * libm::log2(full_resolution_share / weight)) as u32
 }
 
 /// An even `resolution` halved this number of times; even, and below [`MIN_HALVED_RESOLUTION`] only

@@ -223,7 +223,7 @@ impl<L: Leaf> LightTree<L> {
         }
         // The half-angle of the node as seen from the point.
         let (distance, radius) = (to.length(), half.length());
-        let view = if radius < distance { (radius / distance).asin() } else { PI };
+        let view = if radius < distance { libm::asin(radius / distance) } else { PI };
         let from_centre = -to / distance;
         let to = node.middle - point.position;
         let distance = to.length();
@@ -250,7 +250,7 @@ impl<L: Leaf> LightTree<L> {
             _ => intensity,
         };
         let highest = ((height + above) / nearest).min(1.0);
-        let cosine = if node.facing.is_some() { facing[0].cos() } else { 1.0 };
+        let cosine = if node.facing.is_some() { libm::cos(facing[0]) } else { 1.0 };
         let peak = of_profile.unwrap_or(node.peak * cosine);
         let limit = peak * highest / (nearest * nearest);
         let square = distance * distance;

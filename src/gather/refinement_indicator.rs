@@ -252,7 +252,7 @@ impl RelativeError {
     /// The largest between the ends of `sides`; 0 without any.
     fn largest(&self, sides: impl Iterator<Item = [NodeValue; 2]>) -> f64 {
         let either = |[a, b]: [NodeValue; 2]| {
-            let noise = a.noise.hypot(b.noise);
+            let noise = libm::hypot(a.noise, b.noise);
             self.error(a.value, b.value, noise).max(self.error(b.value, a.value, noise))
         };
         sides.map(either).fold(0.0, f64::max)

@@ -97,8 +97,8 @@ impl HierarchicalSurplus {
 
     /// Standard error of the surplus of midside `k`, W/m²: a length over the channels.
     fn surplus_noise(&self, k: usize) -> f64 {
-        let ends = self.corners[k].noise.hypot(self.corners[(k + 1) % 3].noise) / 2.0;
-        self.midsides[k].noise.hypot(ends)
+        let ends = libm::hypot(self.corners[k].noise, self.corners[(k + 1) % 3].noise) / 2.0;
+        libm::hypot(self.midsides[k].noise, ends)
     }
 
     /// The midsides that are not buried, by number.

@@ -138,7 +138,7 @@ fn mixed(front: IrradianceSample, back: IrradianceSample, share: Rgb) -> Irradia
             (Some(front), Some(back)) => Some(front + share * (back - front)),
             _ => None,
         },
-        noise: ((1.0 - mean) * front.noise).hypot(mean * back.noise),
+        noise: libm::hypot((1.0 - mean) * front.noise, mean * back.noise),
         near_paths: front.near_paths || back.near_paths,
         ..front
     }

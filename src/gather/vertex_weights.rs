@@ -42,8 +42,8 @@ pub(super) fn vertex_weights(
 /// Divides `areas` by that of a weight of 1.
 fn as_weights(areas: &mut [f64]) {
     let sum = areas.iter().sum::<f64>();
-    let powers = areas.par_iter().map(|area| area.powf(RAYS_BY_WEIGHT)).sum::<f64>();
-    let reference = (sum / powers).powf(1.0 / (1.0 - RAYS_BY_WEIGHT));
+    let powers = areas.par_iter().map(|&area| libm::pow(area, RAYS_BY_WEIGHT)).sum::<f64>();
+    let reference = libm::pow(sum / powers, 1.0 / (1.0 - RAYS_BY_WEIGHT));
     if reference > 0.0 {
         areas.iter_mut().for_each(|area| *area /= reference);
     }

@@ -123,8 +123,8 @@ pub(crate) fn collapsed_point([a, b, c]: [DVec3; 3], u: f64, v: f64) -> DVec3 {
 /// Level k has the nodes that step 2^−(k+1) adds to those of twice that step.
 static TANH_SINH: LazyLock<Vec<Vec<Node>>> = LazyLock::new(|| {
     let node_at = |s: f64| {
-        let x = 1.0 / (1.0 + (PI * s.sinh()).exp());
-        node(x, PI * s.cosh() * x * (1.0 - x))
+        let x = 1.0 / (1.0 + libm::exp(PI * libm::sinh(s)));
+        node(x, PI * libm::cosh(s) * x * (1.0 - x))
     };
     let level = |k: u32| {
         let step = 0.5_f64.powi(k as i32 + 1);

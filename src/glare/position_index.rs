@@ -29,10 +29,10 @@ pub fn position_index(observer: &Observer, direction: DVec3) -> Option<f64> {
         let slope = if tangent < 0.6 { 0.8 } else { 1.2 };
         return Some(1.0 + slope * tangent);
     }
-    let sigma = tangent.atan().to_degrees();
-    let tau = (above / across.length()).clamp(-1.0, 1.0).acos().to_degrees();
+    let sigma = libm::atan(tangent).to_degrees();
+    let tau = libm::acos((above / across.length()).clamp(-1.0, 1.0)).to_degrees();
     let tau = if tau.is_nan() { 0.0 } else { tau };
-    let first = 35.2 - 0.31889 * tau - 1.22 * (-2.0 * tau / 9.0).exp();
+    let first = 35.2 - 0.31889 * tau - 1.22 * libm::exp(-2.0 * tau / 9.0);
     let second = 21.0 + 0.26667 * tau - 0.002963 * tau * tau;
-    Some((1e-3 * first * sigma + 1e-5 * second * sigma * sigma).exp())
+    Some(libm::exp(1e-3 * first * sigma + 1e-5 * second * sigma * sigma))
 }

@@ -167,7 +167,7 @@ fn surface(
 fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let [x, y, z] = [a, b, c].map(DVec3::length);
     let volume = a.dot(b.cross(c)).abs();
-    2.0 * volume.atan2(x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
+    2.0 * libm::atan2(volume, x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
 }
 
 /// Adds what is seen of a luminaire: intensity over the projected area of its opening.

@@ -161,7 +161,7 @@ impl<'a> FloorRaster<'a> {
             let is_inside = |axis: usize| (0..self.counts[axis] as i64).contains(&cell[axis]);
             let off = |axis: usize| at[axis] - (cell[axis] as f64 + 0.5);
             (is_inside(0) && is_inside(1)).then(|| {
-                (off(0).hypot(off(1)), cell[1] as usize * self.counts[0] + cell[0] as usize)
+                (libm::hypot(off(0), off(1)), cell[1] as usize * self.counts[0] + cell[0] as usize)
             })
         });
         let visible = cells.filter(|&(_, k)| {

@@ -40,7 +40,7 @@ impl GridSettings {
         let (long, short) = (a.max(b), a.min(b));
         // EN 12464-1:2011, 4.4.
         let d = if long >= 2.0 * short { short } else { long };
-        let by_norm = (0.2 * 5f64.powf(d.log10())).min(10.0);
+        let by_norm = (0.2 * libm::pow(5f64, libm::log10(d))).min(10.0);
         let p = self.spacing.unwrap_or(by_norm);
         // The next odd number; 1e-9 keeps rounding of a whole number of cells from adding one.
         let counts = [a, b].map(|edge| (edge / p * (1.0 - 1e-9) / 2.0 - 0.5).ceil() * 2.0 + 1.0);

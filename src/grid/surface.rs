@@ -136,7 +136,7 @@ impl LevelSurface {
         let Some(inner) = plane.without(strip) else { return Ok(None) };
         let axes = self.axes(&inner);
         let around = |k: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / 8.0).sin_cos();
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / 8.0);
             strip * (cos * axes[0] + sin * axes[1])
         };
         let inside = |p: DVec3| has(p) && (0..8).all(|k| has(p + around(k)));

@@ -45,7 +45,7 @@ impl Split {
         }
         // Terms fall by e^−z ≤ 0.223: term 30 is 1e-19 of the first.
         let term = |n: f64| {
-            (-n * z).exp() * (((z + 3.0 / n) * z + 6.0 / (n * n)) * z + 6.0 / (n * n * n)) / n
+            libm::exp(-n * z) * (((z + 3.0 / n) * z + 6.0 / (n * n)) * z + 6.0 / (n * n * n)) / n
         };
         let below = (1..=30).rev().map(|n| term(f64::from(n))).sum::<f64>() / WHOLE;
         Split { below, above: 1.0 - below }
@@ -125,7 +125,7 @@ impl Bands<'_> {
                     let moved = if z > NO_SHORTER_WAVES {
                         0.0
                     } else {
-                        z.powi(4) / z.exp_m1() / WHOLE / 4.0
+                        z.powi(4) / libm::expm1(z) / WHOLE / 4.0
                     };
                     (Split::at(edge * temperature), moved)
                 }

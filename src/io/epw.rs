@@ -9,6 +9,7 @@
 
 use std::path::Path;
 
+use super::Input;
 use super::files::read_text;
 use super::text::{Line, finite, physical_lines};
 use crate::error::{Error, ErrorKind, shortened};
@@ -63,16 +64,13 @@ const MISSING: f64 = 9999.0;
 /// # Errors
 /// [`ErrorKind::File`] for a file that cannot be read; [`ErrorKind::Scene`] where it is malformed,
 /// with line and field.
-pub fn read_epw(path: impl AsRef<Path>) -> Result<Weather, Error> {
-    let path = path.as_ref();
-    epw_from_text(path, &read_text(path, MOST)?)
+pub fn read_epw<'i>(file: impl Into<Input<'i>>) -> Result<Weather, Error> {
+    let file = file.into();
+    parse(file.path(), &read_text(file.clone(), MOST)?)
 }
 
-/// The weather in the `text` of an EPW file; `path` is for messages.
-///
-/// # Errors
-/// [`ErrorKind::Scene`] where it is malformed, with line and field.
-pub fn epw_from_text(path: &Path, text: &str) -> Result<Weather, Error> {
+/// The weather in the `text` of the EPW file `path`.
+fn parse(path: &Path, text: &str) -> Result<Weather, Error> {
     let (mut place, mut an_hour, mut rows) = (None, 1.0, vec![]);
     for line in physical_lines(path, text).filter(|line| !line.text.is_empty()) {
         let row = Row::new(&line);

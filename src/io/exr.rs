@@ -1,10 +1,8 @@
 //! OpenEXR output: linear light, one 32-bit float per channel, in scan lines (ZIP).
 
-use std::path::Path;
-
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage};
 
-use super::{cannot_write, write_file};
+use super::Output;
 use crate::camera::RadianceImage;
 use crate::error::{Error, ErrorKind};
 #[cfg(feature = "light-map")]
@@ -16,10 +14,10 @@ use crate::scene::Rgb;
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or cannot represent a radiance:
 /// above 3.4e38. Values below 1e-38 become 0, or keep few digits.
-pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    let size = [image.width, image.height];
-    let channels = rgb(path.as_ref(), size, &image.pixels, ["radiance", "W/(m² sr)"])?;
-    write(path.as_ref(), size, channels.into())
+pub fn write_exr<'o>(out: impl Into<Output<'o>>, image: &RadianceImage) -> Result<(), Error> {
+    let (out, size) = (out.into(), [image.width, image.height]);
+    let channels = rgb(&out, size, &image.pixels, ["radiance", "W/(m² sr)"])?;
+    write(out, size, channels.into())
 }
 
 /// Writes the irradiance of a light map or a page of it, W/m², as a 32-bit float OpenEXR. Its
@@ -30,17 +28,17 @@ pub fn write_exr(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Er
 /// # Errors
 /// Those of [`write_exr`].
 #[cfg(feature = "light-map")]
-pub fn write_light_map_exr<'a>(
-    path: impl AsRef<Path>,
+pub fn write_light_map_exr<'a, 'o>(
+    out: impl Into<Output<'o>>,
     map: impl Into<MapPage<'a>>,
 ) -> Result<(), Error> {
-    let page = map.into();
-    let (map, path) = (page.map, path.as_ref());
-    let [r, g, b] = rgb(path, page.size(), &page.of(&map.irradiance), ["irradiance", "W/m²"])?;
+    let (page, out) = (map.into(), out.into());
+    let map = page.map;
+    let [r, g, b] = rgb(&out, page.size(), &page.of(&map.irradiance), ["irradiance", "W/m²"])?;
     let gathered = page.of(&map.gathered);
     let coverage = gathered.into_iter().map(|gathered| f32::from(u8::from(gathered))).collect();
     let error = page.of(&map.standard_error).into_iter().map(|error| error as f32).collect();
-    write(path, page.size(), vec![r, g, b, ("coverage", coverage), ("error", error)])
+    write(out, page.size(), vec![r, g, b, ("coverage", coverage), ("error", error)])
 }
 
 /// Writes how the irradiance of a light map or a page of it changes with the normal, W/m², as a
@@ -50,20 +48,19 @@ pub fn write_light_map_exr<'a>(
 /// # Errors
 /// Those of [`write_exr`].
 #[cfg(feature = "light-map")]
-pub fn write_light_map_directional<'a>(
-    path: impl AsRef<Path>,
+pub fn write_light_map_directional<'a, 'o>(
+    out: impl Into<Output<'o>>,
     map: impl Into<MapPage<'a>>,
     changes: &[Vec<Rgb>; 3],
 ) -> Result<(), Error> {
-    let page = map.into();
+    let (page, out) = (map.into(), out.into());
     let names = [["x.R", "x.G", "x.B"], ["y.R", "y.G", "y.B"], ["z.R", "z.G", "z.B"]];
     let mut channels = vec![];
     for (names, values) in names.into_iter().zip(changes) {
-        let of_axis =
-            rgb(path.as_ref(), page.size(), &page.of(values), ["change of irradiance", "W/m²"])?;
+        let of_axis = rgb(&out, page.size(), &page.of(values), ["change of irradiance", "W/m²"])?;
         channels.extend(names.into_iter().zip(of_axis).map(|(name, (_, values))| (name, values)));
     }
-    write(path.as_ref(), page.size(), channels)
+    write(out, page.size(), channels)
 }
 
 /// Writes the radiosity of a light map or a page of it, W/m², as a 32-bit float OpenEXR with
@@ -73,14 +70,14 @@ pub fn write_light_map_directional<'a>(
 /// # Errors
 /// Those of [`write_exr`].
 #[cfg(feature = "light-map")]
-pub fn write_light_map_radiosity<'a>(
-    path: impl AsRef<Path>,
+pub fn write_light_map_radiosity<'a, 'o>(
+    out: impl Into<Output<'o>>,
     map: impl Into<MapPage<'a>>,
 ) -> Result<(), Error> {
-    let page = map.into();
+    let (page, out) = (map.into(), out.into());
     let radiosity = page.of(&page.map.radiosity());
-    let channels = rgb(path.as_ref(), page.size(), &radiosity, ["radiosity", "W/m²"])?;
-    write(path.as_ref(), page.size(), channels.into())
+    let channels = rgb(&out, page.size(), &radiosity, ["radiosity", "W/m²"])?;
+    write(out, page.size(), channels.into())
 }
 
 /// Name and samples of a channel, row by row from the top.
@@ -88,7 +85,7 @@ type Channel = (&'static str, Vec<f32>);
 
 /// The channels of `pixels`, a quantity in a unit, if 32-bit floats represent all of them.
 fn rgb(
-    path: &Path,
+    out: &Output<'_>,
     [width, _]: [u32; 2],
     pixels: &[Rgb],
     [quantity, unit]: [&str; 2],
@@ -96,7 +93,7 @@ fn rgb(
     let fits = |c: &Rgb| c.abs().max_element() <= f64::from(f32::MAX);
     if let Some(k) = pixels.iter().position(|c| !fits(c)) {
         let (column, row) = (k % width as usize, k / width as usize);
-        let place = format!("{}: pixel {column}, {row}", path.display());
+        let place = format!("{}: pixel {column}, {row}", out.name());
         let found = format!("{quantity} {} {unit}", pixels[k]);
         let remedy = "OpenEXR holds up to 3.4e38 a channel: scale exitances down";
         return Err(Error::new(ErrorKind::File, place, found, remedy));
@@ -105,7 +102,7 @@ fn rgb(
     Ok([("R", samples(0)), ("G", samples(1)), ("B", samples(2))])
 }
 
-fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Result<(), Error> {
+fn write(out: Output<'_>, [width, height]: [u32; 2], channels: Vec<Channel>) -> Result<(), Error> {
     let channel = |(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples));
     let channels = AnyChannels::sort(channels.into_iter().map(channel).collect());
     let size = (width as usize, height as usize);
@@ -114,6 +111,6 @@ fn write(path: &Path, [width, height]: [u32; 2], channels: Vec<Channel>) -> Resu
     let image = Image::from_encoded_channels(size, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(vec![]);
     // One block after the other: parallel writes would change their order from run to run.
-    image.write().non_parallel().to_buffered(&mut bytes).map_err(|e| cannot_write(path, e))?;
-    write_file(path, |out| std::io::Write::write_all(out, bytes.get_ref()))
+    image.write().non_parallel().to_buffered(&mut bytes).map_err(|e| out.cannot_write(e))?;
+    out.write_bytes(bytes.get_ref())
 }

@@ -12,7 +12,7 @@ use std::path::{Component, Path, PathBuf};
 
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use super::cannot_read;
+use super::Input;
 use crate::error::{Error, quoted};
 
 /// Maximum number of bytes of an OBJ file, and of all its libraries together: a corner takes at
@@ -151,7 +151,8 @@ impl<'a> FileSource<'a> {
             Place::Folder(_) => read_bytes(&self.path(name), most),
             Place::Memory(files) => {
                 let named = |file: &&(&str, _)| plain(file.0) == plain(name);
-                limited(files.iter().find(named).ok_or(ErrorKind::NotFound)?.1, most)
+                let file = files.iter().find(named).ok_or(ErrorKind::NotFound)?;
+                limited(file.1, most).map(Vec::from)
             }
         }
     }
@@ -219,9 +220,9 @@ pub(super) fn is_gltf(path: &Path, bytes: &[u8]) -> bool {
     is_named || bytes.starts_with(b"glTF") || first == Some(&b'{')
 }
 
-/// A copy of `bytes`, if there are at most `most`.
-pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<Vec<u8>> {
-    if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes.into()) }
+/// `bytes`, if there are at most `most`.
+pub(super) fn limited(bytes: &[u8], most: u64) -> io::Result<&[u8]> {
+    if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
 }
 
 fn too_large(most: u64) -> io::Error {
@@ -233,10 +234,8 @@ fn too_large(most: u64) -> io::Error {
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when it cannot be read, or is larger.
-pub fn read_text(path: impl AsRef<Path>, most: u64) -> Result<String, Error> {
-    let path = path.as_ref();
-    let bytes = read_bytes(path, most).map_err(|e| cannot_read(path, e, "give a text file"))?;
-    let (mut text, _) = decode(bytes);
+pub fn read_text<'i>(file: impl Into<Input<'i>>, most: u64) -> Result<String, Error> {
+    let (mut text, _) = decode(file.into().read(most, "give a text file")?.into_owned());
     if text.starts_with('\u{feff}') {
         text.drain(..'\u{feff}'.len_utf8());
     }

@@ -20,7 +20,6 @@ mod two_sides;
 
 use std::collections::BTreeMap;
 use std::io;
-use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 use gltf_json::mesh::Semantic;
@@ -30,7 +29,7 @@ use gltf_json::{Index, Material, Texture, Value};
 use image::ImageResult;
 use rustc_hash::FxHashMap;
 
-use super::cannot_write;
+use super::Output;
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::geometry::aabb::Aabb;
@@ -75,14 +74,14 @@ use two_sides::TwoSides;
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
-pub fn write_glb(
-    path: impl AsRef<Path>,
+pub fn write_glb<'o>(
+    out: impl Into<Output<'o>>,
     light: &GatheredMesh,
     settings: impl Into<GlbSettings>,
 ) -> Result<(), Error> {
-    let (path, settings) = (path.as_ref(), settings.into());
+    let (out, settings) = (out.into(), settings.into());
     let model = Model::new(light, &settings);
-    let model = model.map_err(|e| cannot_write(path, io::Error::other(e)))?;
+    let model = model.map_err(|e| out.cannot_write(io::Error::other(e)))?;
     let mut file = GlbFile::new(&model.notes());
     let (mut materials, mut groups) = (BTreeMap::new(), vec![]);
     for of_group in model.primitives.chunk_by(|a, b| a.group == b.group) {
@@ -102,7 +101,7 @@ pub fn write_glb(
         file.add_image(png, None);
     }
     let top = settings.top_node(light.mesh.scene(), model.origin.as_dvec3());
-    file.write(path, top, groups)
+    file.write(out, top, groups)
 }
 
 /// Origin of the positions written for a scene with these `bounds`, scene unit.

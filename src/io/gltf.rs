@@ -25,17 +25,16 @@ mod nodes;
 mod rewritten;
 
 use std::collections::HashSet;
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::files::{FileSource, MAX_BYTES, is_gltf, read_bytes};
+use super::files::{FileSource, MAX_BYTES, is_gltf};
 use super::given::{check_names, emit_on_both_sides};
 use super::lights::sky_and_warning;
 use super::obj::repairs::Repairs;
-use super::{SceneSettings, cannot_read};
+use super::{Input, SceneSettings};
 use crate::camera::Camera;
 use crate::error::Error;
 use crate::scene::{Scene, SceneTextures, Warning, WarningKind};
@@ -218,19 +217,20 @@ impl Geometry {
     }
 }
 
-/// The ending that names of such files have, if the file `path` is glTF by its content: `glb` if it
+/// What should have been given in place of a file that cannot be read.
+const REMEDY: &str = "give a readable scene";
+
+/// The ending that names of such files have, if `file` is glTF by its content: `glb` if it
 /// is binary, else `gltf`.
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] if the file cannot be read.
-pub fn gltf_ending(path: impl AsRef<Path>) -> Result<Option<&'static str>, Error> {
-    let path = path.as_ref();
-    let cannot = |e| cannot_read(path, e, "give a readable scene");
-    let mut first = vec![];
-    let file = File::open(path).map_err(cannot)?;
-    file.take(64).read_to_end(&mut first).map_err(cannot)?;
+pub fn gltf_ending<'i>(file: impl Into<Input<'i>>) -> Result<Option<&'static str>, Error> {
+    let (file, mut first) = (file.into(), vec![]);
+    let start = file.open(REMEDY)?.take(64).read_to_end(&mut first);
+    start.map_err(|e| file.cannot_read(e, REMEDY))?;
     let ending = if first.starts_with(b"glTF") { "glb" } else { "gltf" };
-    Ok(is_gltf(path, &first).then_some(ending))
+    Ok(is_gltf(file.path(), &first).then_some(ending))
 }
 
 /// The perspective cameras of a glTF file's own scene, by the names of their nodes; none of other
@@ -239,14 +239,13 @@ pub fn gltf_ending(path: impl AsRef<Path>) -> Result<Option<&'static str>, Error
 /// # Errors
 /// [`crate::ErrorKind::File`] if the file cannot be read, [`crate::ErrorKind::Scene`] if its JSON
 /// cannot.
-pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<(String, Camera)>, Error> {
-    let path = path.as_ref();
-    let at_file = |fault: Fault| fault.at(path.display().to_string());
-    let cannot = |e| cannot_read(path, e, "give a readable scene");
-    if gltf_ending(path)?.is_none() {
+pub fn read_cameras<'i>(file: impl Into<Input<'i>>) -> Result<Vec<(String, Camera)>, Error> {
+    let file = file.into();
+    let at_file = |fault: Fault| fault.at(file.path().display().to_string());
+    if gltf_ending(file.clone())?.is_none() {
         return Ok(vec![]);
     }
-    let bytes = read_bytes(path, MAX_BYTES).map_err(cannot)?;
+    let bytes = file.read(MAX_BYTES, REMEDY)?;
     let document = Container::new(&bytes).and_then(|container| container.document());
     let document = document.map_err(at_file)?;
     let nodes = Nodes::new(&document, None).map_err(at_file)?;

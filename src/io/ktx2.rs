@@ -4,9 +4,7 @@
 //! "KTX File Format Specification 2.0" and "Khronos Data Format Specification 1.3", Khronos Group;
 //! conversion as in "OpenGL 4.6", section 8.5.2.
 
-use std::path::Path;
-
-use super::write_file;
+use super::Output;
 use crate::error::{Error, ErrorKind};
 use crate::light_map::MapPage;
 use crate::scene::Rgb;
@@ -38,20 +36,19 @@ const LARGEST: f64 = 65408.0;
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be written, or for an irradiance above 65 408 W/m².
-pub fn write_light_map_ktx2<'a>(
-    path: impl AsRef<Path>,
+pub fn write_light_map_ktx2<'a, 'o>(
+    out: impl Into<Output<'o>>,
     map: impl Into<MapPage<'a>>,
 ) -> Result<(), Error> {
-    let (page, path) = (map.into(), path.as_ref());
+    let (page, out) = (map.into(), out.into());
     let levels = page.levels();
     let largest = levels[0].values.iter().map(|e| e.max_element()).fold(0.0, f64::max);
     if largest > LARGEST {
         let found = format!("irradiance {largest} W/m²");
         let remedy = "KTX 2.0 with E5B9G9R9 holds up to 65408: scale exitances down";
-        return Err(Error::new(ErrorKind::File, path.display().to_string(), found, remedy));
+        return Err(Error::new(ErrorKind::File, out.name(), found, remedy));
     }
-    let bytes = file(&levels);
-    write_file(path, |out| std::io::Write::write_all(out, &bytes))
+    out.write_bytes(&file(&levels))
 }
 
 /// An image of a map.
@@ -168,9 +165,9 @@ fn data_format_descriptor() -> Vec<u8> {
 fn encoded(e: Rgb) -> u32 {
     let e = e.clamp(Rgb::ZERO, Rgb::splat(LARGEST));
     let largest = e.max_element();
-    let steps = |exponent: i32| f64::from(exponent - BIAS - MANTISSA).exp2();
+    let steps = |exponent: i32| libm::exp2(f64::from(exponent - BIAS - MANTISSA));
     // Up to the power of two above the brightest channel.
-    let floor = if largest > 0.0 { largest.log2().floor() as i32 } else { -BIAS - 1 };
+    let floor = if largest > 0.0 { libm::log2(largest).floor() as i32 } else { -BIAS - 1 };
     let mut exponent = floor.max(-BIAS - 1) + 1 + BIAS;
     if (largest / steps(exponent)).round() >= f64::from(1 << MANTISSA) {
         exponent += 1;

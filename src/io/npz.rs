@@ -9,15 +9,13 @@
 //! | `back_of` | one per group | the group whose back it is, from 0; −1 for fronts |
 //! | `absent` | 1 | meaning of a missing pair: 0 for zero, 2 for unmet ([`Missing`]) |
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Read, Seek};
-use std::path::Path;
+use std::io::{Read, Seek, Write};
 
 use npyz::WriterBuilder;
-use zip::write::SimpleFileOptions;
+use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::{cannot_read, write_file};
+use super::{Input, Output};
 use crate::error::{Error, ErrorKind};
 use crate::view_factor::{Estimate, Factor, MatrixRows, Missing, ViewFactors, are_sides};
 
@@ -27,7 +25,7 @@ use crate::view_factor::{Estimate, Factor, MatrixRows, Missing, ViewFactors, are
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be written.
-pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
+pub fn write_npz<'o>(out: impl Into<Output<'o>>, matrix: &ViewFactors) -> Result<(), Error> {
     let n = matrix.names.len() as i64;
     let factors = || matrix.factors.iter().flatten();
     let ends = matrix.factors.iter().scan(0, |end, row| {
@@ -42,8 +40,8 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
         Missing::Zero => 0u8,
         Missing::Unmet => 2,
     };
-    write_file(path.as_ref(), |out| {
-        let mut archive = Archive(ZipWriter::new(out));
+    out.into().write(|out| {
+        let mut archive = Archive(ZipWriter::new_stream(out));
         archive.add_format("csr")?;
         archive.add("shape", 2, [n, n].into_iter())?;
         archive.add("indptr", row_starts.len() as u64, row_starts.iter().copied())?;
@@ -66,7 +64,7 @@ pub fn write_npz(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Err
 }
 
 /// An `.npz` file: a zip archive of `.npy` files, none of them compressed.
-struct Archive<'a>(ZipWriter<&'a mut BufWriter<File>>);
+struct Archive<'a>(ZipWriter<StreamWriter<&'a mut dyn Write>>);
 
 impl Archive<'_> {
     /// Begins the array `name`.
@@ -107,18 +105,9 @@ impl Archive<'_> {
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be read, or an array is missing, compressed, of a wrong
 /// type or length, or has numbers that are not valid in a matrix of view factors.
-pub fn read_npz(path: impl AsRef<Path>) -> Result<ViewFactors, Error> {
-    let path = path.as_ref();
-    let file = File::open(path).map_err(|e| cannot_read(path, e, "give a readable .npz file"))?;
-    read(BufReader::new(file)).map_err(|e| e.inside(path))
-}
-
-/// [`read_npz`] from memory.
-///
-/// # Errors
-/// Those of [`read_npz`].
-pub fn npz_from_bytes(bytes: &[u8]) -> Result<ViewFactors, Error> {
-    read(std::io::Cursor::new(bytes))
+pub fn read_npz<'i>(file: impl Into<Input<'i>>) -> Result<ViewFactors, Error> {
+    let file = file.into();
+    read(file.open("give a readable .npz file")?).map_err(|e| e.inside(file.path()))
 }
 
 fn wrong(array: &str, found: impl Into<String>, remedy: impl Into<String>) -> Error {

@@ -14,12 +14,11 @@ mod lm_63;
 mod numbers;
 mod planes;
 
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{cannot_read, files};
+use super::{Input, files};
 use crate::error::Error;
 use crate::scene::{IntensityDistribution, Luminaire, Opening};
 
@@ -71,25 +70,14 @@ impl PhotometrySettings {
     /// [`crate::ErrorKind::File`] when the file cannot be read or has more than 4 MiB;
     /// [`crate::ErrorKind::Scene`] with its line if it is of neither format, ends early, has
     /// invalid numbers, or has several sets of lamps, none of which is chosen.
-    pub fn read(&self, path: impl AsRef<Path>) -> Result<Photometry, Error> {
-        let path = path.as_ref();
+    pub fn read<'i>(&self, file: impl Into<Input<'i>>) -> Result<Photometry, Error> {
+        let file = file.into();
         // Five times the bytes of a file with 361 × 181 values.
-        let bytes = files::read_bytes(path, 1 << 22).map_err(|e| {
-            cannot_read(path, e, "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file")
-        })?;
-        self.read_bytes(path, bytes)
-    }
-
-    /// The same from memory; `name` is for messages.
-    ///
-    /// # Errors
-    /// Those of [`PhotometrySettings::read`].
-    pub fn read_bytes(&self, name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Photometry, Error> {
-        let name = name.as_ref();
-        let (text, _) = files::decode(bytes);
+        let bytes = file.read(1 << 22, "give an IESNA LM-63 (.ies) or EULUMDAT (.ldt) file")?;
+        let (text, _) = files::decode(bytes.into_owned());
         match lm_63::is_lm_63(&text) {
-            true => lm_63::read(name, &text),
-            false => eulumdat::read(name, &text, self.lamp_set),
+            true => lm_63::read(file.path(), &text),
+            false => eulumdat::read(file.path(), &text, self.lamp_set),
         }
     }
 }
@@ -98,16 +86,8 @@ impl PhotometrySettings {
 ///
 /// # Errors
 /// Those of [`PhotometrySettings::read`].
-pub fn read_photometry(path: impl AsRef<Path>) -> Result<Photometry, Error> {
-    PhotometrySettings::default().read(path)
-}
-
-/// [`read_photometry`] from memory; `name` is for messages.
-///
-/// # Errors
-/// Those of [`PhotometrySettings::read`].
-pub fn photometry_from_bytes(name: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Photometry, Error> {
-    PhotometrySettings::default().read_bytes(name, bytes)
+pub fn read_photometry<'i>(file: impl Into<Input<'i>>) -> Result<Photometry, Error> {
+    PhotometrySettings::default().read(file)
 }
 
 /// `text` as a name.

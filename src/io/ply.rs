@@ -2,11 +2,10 @@
 
 use std::fmt;
 use std::io::Write;
-use std::path::Path;
 
 use glam::DVec3;
 
-use super::write_file;
+use super::Output;
 use crate::error::Error;
 use crate::geometry::aabb::Aabb;
 use crate::io::tone::ToneCurve;
@@ -27,8 +26,8 @@ use crate::vertex::VertexMesh;
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_ply(path: impl AsRef<Path>, surface: &VertexMesh) -> Result<(), Error> {
-    write_ply_with_tone(path, surface, &ToneCurve::fit(&surface.radiosity))
+pub fn write_ply<'o>(out: impl Into<Output<'o>>, surface: &VertexMesh) -> Result<(), Error> {
+    write_ply_with_tone(out, surface, &ToneCurve::fit(&surface.radiosity))
 }
 
 /// [`write_ply`] with a tone curve of radiosity for `red green blue`, such as that of a picture:
@@ -36,8 +35,8 @@ pub fn write_ply(path: impl AsRef<Path>, surface: &VertexMesh) -> Result<(), Err
 ///
 /// # Errors
 /// Those of [`write_ply`].
-pub fn write_ply_with_tone(
-    path: impl AsRef<Path>,
+pub fn write_ply_with_tone<'o>(
+    out: impl Into<Output<'o>>,
     surface: &VertexMesh,
     tone: &ToneCurve,
 ) -> Result<(), Error> {
@@ -52,7 +51,7 @@ pub fn write_ply_with_tone(
     properties.extend(colours());
     properties.extend(errors.then(|| (light.to_string(), "error".into())));
     let units = "radiosity in W/m2 per channel, linear BT.709";
-    write_mesh(path.as_ref(), surface, units, &properties, |out, v| {
+    write_mesh(out.into(), surface, units, &properties, |out, v| {
         light.write_vector(out, surface.radiosity[v])?;
         if irradiances {
             // A reflectance close to 0 makes it larger than any float.
@@ -79,14 +78,14 @@ pub(super) type Property = (String, String);
 /// Writes `surface`: its comments after that of the `units`, its vertices with positions, normals
 /// and these `properties`, which `vertex` writes, and its faces.
 pub(super) fn write_mesh(
-    path: &Path,
+    out: Output<'_>,
     surface: &VertexMesh,
     units: &str,
     properties: &[Property],
     vertex: impl Fn(&mut dyn Write, usize) -> std::io::Result<()>,
 ) -> Result<(), Error> {
     let place = Width::of_positions(surface);
-    write_file(path, |out| {
+    out.write(|out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
         writeln!(out, "comment {units}")?;
         for comment in &surface.comments {

@@ -1,7 +1,6 @@
 //! PLY output with a property for each band.
 
-use std::path::Path;
-
+use super::Output;
 use super::ply::{self, Property, Width, write_mesh};
 use crate::bands::BandLight;
 use crate::error::Error;
@@ -18,8 +17,8 @@ use crate::io::tone::ToneCurve;
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_ply_bands(
-    path: impl AsRef<Path>,
+pub fn write_ply_bands<'o>(
+    out: impl Into<Output<'o>>,
     light: &BandLight,
     tone: Option<&ToneCurve>,
 ) -> Result<(), Error> {
@@ -37,7 +36,7 @@ pub fn write_ply_bands(
         properties.extend(ply::colours());
     }
     let units = "radiosity in W/m2, or W/(m2 nm), by band";
-    write_mesh(path.as_ref(), surface, units, &properties, |out, v| {
+    write_mesh(out.into(), surface, units, &properties, |out, v| {
         for b in v * bands.len()..(v + 1) * bands.len() {
             columns.iter().try_for_each(|(_, values)| width.write(out, values[b]))?;
         }

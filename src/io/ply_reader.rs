@@ -1,14 +1,12 @@
 //! PLY input: a mesh with radiosity, written by the crate or another program.
 
-use std::path::Path;
-
 use glam::DVec3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::{cannot_read, files};
+use super::Input;
 use crate::error::{Error, ErrorKind, quoted, shortened};
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
@@ -42,11 +40,10 @@ const NAMES: [&str; 13] = [
 /// - [`ErrorKind::File`] when the file cannot be read, or has more than 4 GiB.
 /// - [`ErrorKind::Scene`] when it is malformed, a property is missing, a number is not finite, or
 ///   a face has fewer than three vertices or one that does not exist.
-pub fn read_ply(path: impl AsRef<Path>) -> Result<VertexMesh, Error> {
-    let path = path.as_ref();
-    let bytes = files::read_bytes(path, 1 << 32)
-        .map_err(|e| cannot_read(path, e, "give a PLY file that can be read"))?;
-    parse(&bytes).map_err(|e| e.inside(path))
+pub fn read_ply<'i>(file: impl Into<Input<'i>>) -> Result<VertexMesh, Error> {
+    let file = file.into();
+    let bytes = file.read(1 << 32, "give a PLY file that can be read")?;
+    parse(&bytes).map_err(|e| e.inside(file.path()))
 }
 
 fn parse(bytes: &[u8]) -> Result<VertexMesh, Error> {

@@ -1,8 +1,6 @@
 //! PNG output: tone-mapped colours for viewing.
 
-use std::path::Path;
-
-use super::{cannot_write, write_file};
+use super::Output;
 use crate::camera::RadianceImage;
 use crate::error::Error;
 use crate::io::tone::ToneCurve;
@@ -11,19 +9,20 @@ use crate::io::tone::ToneCurve;
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_png(path: impl AsRef<Path>, image: &RadianceImage) -> Result<(), Error> {
-    write_png_with_tone(path, image, &ToneCurve::fit_image(image))
+pub fn write_png<'o>(out: impl Into<Output<'o>>, image: &RadianceImage) -> Result<(), Error> {
+    write_png_with_tone(out, image, &ToneCurve::fit_image(image))
 }
 
 /// [`write_png`] with a tone curve of radiance, such as that of another image.
 ///
 /// # Errors
 /// Those of [`write_png`].
-pub fn write_png_with_tone(
-    path: impl AsRef<Path>,
+pub fn write_png_with_tone<'o>(
+    out: impl Into<Output<'o>>,
     image: &RadianceImage,
     tone: &ToneCurve,
 ) -> Result<(), Error> {
+    let out = out.into();
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|&c| tone.display(c)).collect();
     let mut png = std::io::Cursor::new(vec![]);
     image::write_buffer_with_format(
@@ -34,6 +33,6 @@ pub fn write_png_with_tone(
         image::ExtendedColorType::Rgb8,
         image::ImageFormat::Png,
     )
-    .map_err(|e| cannot_write(path.as_ref(), e))?;
-    write_file(path.as_ref(), |out| std::io::Write::write_all(out, png.get_ref()))
+    .map_err(|e| out.cannot_write(e))?;
+    out.write_bytes(png.get_ref())
 }

@@ -3,7 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use super::files::{self, MAX_BYTES};
+use super::Input;
+use super::files::MAX_BYTES;
 use crate::error::{Error, ErrorKind};
 use crate::scene::Rgb;
 
@@ -13,10 +14,9 @@ use crate::scene::Rgb;
 ///
 /// # Errors
 /// [`ErrorKind::File`] when the file cannot be read, is neither, or has pixels that are not finite.
-pub fn read_radiance(path: impl AsRef<Path>) -> Result<(u32, Vec<Rgb>), Error> {
-    let path = path.as_ref();
-    let bytes = files::read_bytes(path, MAX_BYTES);
-    let bytes = bytes.map_err(|e| wrong(path, format!("cannot be read: {e}")))?;
+pub fn read_radiance<'i>(file: impl Into<Input<'i>>) -> Result<(u32, Vec<Rgb>), Error> {
+    let file = file.into();
+    let (bytes, path) = (file.read(MAX_BYTES, REMEDY)?, file.path());
     let (width, pixels) = match bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         true => from_exr(&bytes).map_err(|e| wrong(path, e.to_string()))?,
         false => from_hdr(&bytes).map_err(|e| wrong(path, e.to_string()))?,
@@ -29,9 +29,10 @@ pub fn read_radiance(path: impl AsRef<Path>) -> Result<(u32, Vec<Rgb>), Error> {
     Ok((width as u32, pixels))
 }
 
+const REMEDY: &str = "give a picture of finite radiance, OpenEXR with R, G and B or Radiance RGBE";
+
 fn wrong(path: &Path, found: String) -> Error {
-    let remedy = "give a picture of finite radiance, OpenEXR with R, G and B or Radiance RGBE";
-    Error::new(ErrorKind::File, path.display().to_string(), found, remedy)
+    Error::new(ErrorKind::File, path.display().to_string(), found, REMEDY)
 }
 
 fn from_exr(bytes: &[u8]) -> Result<(usize, Vec<Rgb>), exr::error::Error> {

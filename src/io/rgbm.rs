@@ -5,9 +5,7 @@
 //! with which the brightest channel can be represented, so that a channel is off by half a step of
 //! colour, squared: 0.4 % of the brightest one.
 
-use std::path::Path;
-
-use super::{cannot_write, write_file};
+use super::Output;
 use crate::error::Error;
 use crate::light_map::{LightMap, MapPage};
 use crate::scene::Rgb;
@@ -24,20 +22,20 @@ pub fn rgbm_range(map: &LightMap) -> f64 {
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_light_map_rgbm<'a>(
-    path: impl AsRef<Path>,
+pub fn write_light_map_rgbm<'a, 'o>(
+    out: impl Into<Output<'o>>,
     map: impl Into<MapPage<'a>>,
     range: f64,
 ) -> Result<(), Error> {
-    let (page, path) = (map.into(), path.as_ref());
+    let (page, out) = (map.into(), out.into());
     let texels = page.of(&page.map.irradiance);
     let bytes: Vec<u8> = texels.into_iter().flat_map(|e| encoded(e, range)).collect();
     let [width, height] = page.size();
     let mut png = std::io::Cursor::new(vec![]);
     let (colours, format) = (image::ExtendedColorType::Rgba8, image::ImageFormat::Png);
     image::write_buffer_with_format(&mut png, &bytes, width, height, colours, format)
-        .map_err(|e| cannot_write(path, e))?;
-    write_file(path, |out| std::io::Write::write_all(out, png.get_ref()))
+        .map_err(|e| out.cannot_write(e))?;
+    out.write_bytes(png.get_ref())
 }
 
 /// Colour and alpha of a texel.

@@ -1,13 +1,12 @@
 //! Settings for reading a scene, and which reader reads it.
 
-use std::io;
 use std::path::Path;
 
-use super::files::{self, FileSource, MAX_BYTES, is_gltf};
+use super::files::{MAX_BYTES, is_gltf};
 #[cfg(feature = "glb")]
 use super::gltf::{self, LampUnits};
 use super::specular::SpecularSurfaces;
-use super::{cannot_read, obj};
+use super::{Input, obj};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::{Rgb, Scene, Sides, Sky};
 
@@ -55,8 +54,8 @@ use crate::scene::{Rgb, Scene, Sides, Sky};
 /// file, for invalid content: coordinates that are not finite numbers, corners without a vertex, no
 /// face at all, nodes below themselves; for a mesh that is compressed; and for a scene without a
 /// triangle that has area.
-pub fn load_scene(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    SceneSettings::default().load(path)
+pub fn load_scene<'i>(file: impl Into<Input<'i>>) -> Result<Scene, Error> {
+    SceneSettings::default().load(file)
 }
 
 /// [`load_scene`] from memory: a file of this name, used in messages, and this content. `files` are
@@ -77,8 +76,8 @@ pub fn read_scene(
 /// # Errors
 /// Those of [`load_scene`].
 #[deprecated = "renamed to load_scene, which reads glTF too"]
-pub fn load_obj(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    load_scene(path)
+pub fn load_obj<'i>(file: impl Into<Input<'i>>) -> Result<Scene, Error> {
+    load_scene(file)
 }
 
 /// The former name of [`read_scene`].
@@ -161,12 +160,16 @@ impl SceneSettings {
     /// 1), a radiance that is negative or not finite or a transmittance outside [0, 1);
     /// [`ErrorKind::Scene`] for an emitting or transmitting material that the scene does not have,
     /// and with [`SceneSettings::strict`] for content that would be repaired.
-    pub fn load(&self, path: impl AsRef<Path>) -> Result<Scene, Error> {
-        let path = path.as_ref();
+    pub fn load<'i>(&self, file: impl Into<Input<'i>>) -> Result<Scene, Error> {
         self.check()?;
-        let bytes = files::read_bytes(path, MAX_BYTES);
-        let files = FileSource::in_folder(path.parent().unwrap_or(Path::new("")));
-        self.read_bytes(path, bytes, &files)
+        let file = file.into();
+        let bytes = file.read(MAX_BYTES, "give a readable scene")?;
+        let (path, files) = (file.path(), file.files());
+        match is_gltf(path, &bytes) {
+            #[cfg(feature = "glb")]
+            true => gltf::read_scene(path, &bytes, &files, self),
+            _ => obj::read_scene(path, bytes.into_owned(), &files, self),
+        }
     }
 
     /// [`SceneSettings::load`] from memory: see [`crate::io::read_scene`].
@@ -179,23 +182,7 @@ impl SceneSettings {
         content: &[u8],
         files: &[(&str, &[u8])],
     ) -> Result<Scene, Error> {
-        self.check()?;
-        let bytes = files::limited(content, MAX_BYTES);
-        self.read_bytes(name.as_ref(), bytes, &FileSource::in_memory(files))
-    }
-
-    fn read_bytes(
-        &self,
-        path: &Path,
-        bytes: io::Result<Vec<u8>>,
-        files: &FileSource<'_>,
-    ) -> Result<Scene, Error> {
-        let bytes = bytes.map_err(|e| cannot_read(path, e, "give a readable scene"))?;
-        match is_gltf(path, &bytes) {
-            #[cfg(feature = "glb")]
-            true => gltf::read_scene(path, &bytes, files, self),
-            _ => obj::read_scene(path, bytes, files, self),
-        }
+        self.load(Input::bytes(&name, content).with_files(files))
     }
 
     fn check(&self) -> Result<(), Error> {

@@ -73,6 +73,7 @@ impl ToneCurve {
 
 /// IEC 61966-2-1, to 8 bits, of a value in [0, 1].
 pub(super) fn srgb(x: f64) -> u8 {
-    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    let encoded =
+        if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8
 }

@@ -11,10 +11,9 @@
 //! scene's length unit squared, factors are dimensionless. `open`, `back` and `area` are in
 //! parentheses where a group is called so ([`ViewFactors::column_name`]).
 
-use std::io::Write;
 use std::path::Path;
 
-use super::{cannot_read, cannot_write, write_file};
+use super::{Input, Output};
 use crate::error::Error;
 use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 
@@ -25,8 +24,8 @@ use crate::view_factor::{Estimate, Missing, PartialMatrix, ViewFactors};
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
-    write_file(path.as_ref(), |out| {
+pub fn write_csv_matrix<'o>(out: impl Into<Output<'o>>, matrix: &ViewFactors) -> Result<(), Error> {
+    out.into().write(|out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
         let own = ["open", "back", "area"].map(|name| matrix.column_name(name)).join(",");
         writeln!(out, "F from row to column,{},{own}", names.join(","))?;
@@ -54,8 +53,8 @@ pub fn write_csv_matrix(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
-    write_file(path.as_ref(), |out| {
+pub fn write_csv_list<'o>(out: impl Into<Output<'o>>, matrix: &ViewFactors) -> Result<(), Error> {
+    out.into().write(|out| {
         let names: Vec<String> = matrix.names.iter().map(|n| quoted(n)).collect();
         let [open, back] = ["open", "back"].map(|name| matrix.column_name(name));
         writeln!(out, "from,to,factor,standard_error,from_area,to_area")?;
@@ -82,18 +81,18 @@ pub fn write_csv_list(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<()
 pub fn write_rows(path: impl AsRef<Path>, rows: &PartialMatrix) -> Result<(), Error> {
     let path = path.as_ref();
     let temporary = path.with_added_extension("new");
-    write_file(&temporary, |out| out.write_all(&rows.to_bytes()))?;
-    std::fs::rename(&temporary, path).map_err(|e| cannot_write(path, e))
+    Output::from(&temporary).write_bytes(&rows.to_bytes())?;
+    std::fs::rename(&temporary, path).map_err(|e| Output::from(path).cannot_write(e))
 }
 
 /// Reads rows written by [`write_rows`].
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be read, has another format, or is damaged.
-pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
-    let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|e| cannot_read(path, e, "give a readable file"))?;
-    PartialMatrix::from_bytes(&bytes).map_err(|e| e.inside(path))
+pub fn read_rows<'i>(file: impl Into<Input<'i>>) -> Result<PartialMatrix, Error> {
+    let file = file.into();
+    let bytes = file.read(u64::MAX, "give a readable file")?;
+    PartialMatrix::from_bytes(&bytes).map_err(|e| e.inside(file.path()))
 }
 
 /// Writes the nonzeros in Matrix Market's coordinate format (R. F. Boisvert, R. Pozo,
@@ -102,8 +101,11 @@ pub fn read_rows(path: impl AsRef<Path>) -> Result<PartialMatrix, Error> {
 ///
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written.
-pub fn write_matrix_market(path: impl AsRef<Path>, matrix: &ViewFactors) -> Result<(), Error> {
-    write_file(path.as_ref(), |out| {
+pub fn write_matrix_market<'o>(
+    out: impl Into<Output<'o>>,
+    matrix: &ViewFactors,
+) -> Result<(), Error> {
+    out.into().write(|out| {
         let n = matrix.names.len();
         writeln!(out, "%%MatrixMarket matrix coordinate real general")?;
         writeln!(
@@ -145,14 +147,14 @@ fn rounded(value: f64) -> (String, f64) {
     if value.abs() >= 1e-5 || value == 0.0 {
         return (format!("{value:.9}"), 1e-9);
     }
-    (format!("{value:.4e}"), 1e-4 * 10f64.powf(value.abs().log10().floor()))
+    (format!("{value:.4e}"), 1e-4 * libm::pow(10f64, libm::log10(value.abs()).floor()))
 }
 
 /// A value and its error with that of rounding: a uniform distribution over one unit of the last
 /// digit.
 fn with_error(Estimate { value, error }: Estimate) -> String {
     let (text, unit) = rounded(value);
-    format!("{text},{:.2e}", error.hypot(unit / 12f64.sqrt()))
+    format!("{text},{:.2e}", libm::hypot(error, unit / 12f64.sqrt()))
 }
 
 /// A CSV field (RFC 4180): quoted if it contains a comma, quote or line break.

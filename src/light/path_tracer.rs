@@ -613,6 +613,6 @@ fn cosine_weighted(normal: DVec3, rng: &mut Rng) -> (DVec3, f64) {
     let (square, turn) = (rng.f64(), TAU * rng.f64());
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let cosine = (1.0 - square).sqrt();
-    let across = turn.cos() * tangent + turn.sin() * bitangent;
+    let across = libm::cos(turn) * tangent + libm::sin(turn) * bitangent;
     ((square.sqrt() * across + cosine * normal).normalize(), cosine)
 }

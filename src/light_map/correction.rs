@@ -58,7 +58,8 @@ impl LightMap {
         for (k, &texel) in texels.iter().enumerate() {
             let texel = texel as usize;
             self.irradiance[texel] = found.irradiance[k];
-            self.standard_error[texel] = self.standard_error[texel].hypot(found.standard_error[k]);
+            self.standard_error[texel] =
+                libm::hypot(self.standard_error[texel], found.standard_error[k]);
         }
         self.finish();
         Ok(Some(found.error))

@@ -160,7 +160,7 @@ impl Cluster {
         let area_vector = self.area_vector + other.area_vector;
         let axis = area_vector.normalize_or_zero();
         let deviation =
-            |part: &Cluster| axis.dot(part.axis).clamp(-1.0, 1.0).acos() + part.max_deviation;
+            |part: &Cluster| libm::acos(axis.dot(part.axis).clamp(-1.0, 1.0)) + part.max_deviation;
         let max_deviation = deviation(self).max(deviation(other));
         Cluster { area, centroid, second_moment, axis, area_vector, max_deviation }
     }

@@ -73,7 +73,7 @@ impl Mesh {
             }
             let longest = longest_edge(self.scene.corners(t));
             let deepest = match longest > finest {
-                true => (longest / finest).log2().ceil().min(f64::from(Mesh::MAX_DEPTH)) as u32,
+                true => libm::log2(longest / finest).ceil().min(f64::from(Mesh::MAX_DEPTH)) as u32,
                 false => 0,
             };
             let mut separated = vec![];

@@ -187,7 +187,7 @@ fn by_angle<'a>(scene: &Scene, sharing: &'a [HalfEdge]) -> Vec<(f64, &'a HalfEdg
     let angle = |edge: &HalfEdge| {
         let (_, out) = across(edge);
         // Triangles that coincide with the first have about its angle, on both sides of 0.
-        let angle = out.dot(quarter).atan2(out.dot(zero));
+        let angle = libm::atan2(out.dot(quarter), out.dot(zero));
         if angle < -FILE_TOLERANCE { angle + TAU } else { angle }
     };
     let mut around: Vec<_> = sharing.iter().map(|edge| (angle(edge), edge)).collect();
@@ -204,7 +204,7 @@ fn continues(
     crease_angle: impl Fn(&Triangle, &Triangle) -> f64,
 ) -> bool {
     let (a, b) = (&scene.triangles()[t], &scene.triangles()[s]);
-    let min_cosine = crease_angle(a, b).to_radians().cos();
+    let min_cosine = libm::cos(crease_angle(a, b).to_radians());
     a.group == b.group
         && a.material == b.material
         && scene.normal(t).dot(scene.normal(s)) >= min_cosine

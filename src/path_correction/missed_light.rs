@@ -179,7 +179,7 @@ impl PathOrigin {
     fn point(&self) -> [f32; 7] {
         let [x, y, z] = self.position.to_array();
         let [u, v, w] = (SHARE_OF_NORMAL * self.normal).to_array();
-        [x, y, z, u, v, w, SHARE_OF_OCTAVE * self.scale.log2()].map(|x| x as f32)
+        [x, y, z, u, v, w, SHARE_OF_OCTAVE * libm::log2(self.scale)].map(|x| x as f32)
     }
 }
 
@@ -187,14 +187,14 @@ impl<const M: usize> Paths<'_, M> {
     fn new(origins: &[PathOrigin], finest: f64) -> Paths<'_, M> {
         let points: Vec<[f32; 7]> = origins.iter().map(PathOrigin::point).collect();
         // 2⁻²⁰ is what 32-bit floats resolve of the unit.
-        let depth = (-finest.log2()).floor().clamp(1.0, 20.0) as i32;
+        let depth = (-libm::log2(finest)).floor().clamp(1.0, 20.0) as i32;
         let set = |k: usize| {
             let mut rng = random_numbers(&[k as u64]);
             NestedCells::new(&points, depth, std::array::from_fn(|_| rng.f32()))
         };
         let sets: Vec<NestedCells> = (0..SETS).into_par_iter().map(set).collect();
         let areas = origins.iter().map(|origin| origin.area).collect();
-        let octaves: Vec<f64> = origins.iter().map(|origin| origin.scale.log2()).collect();
+        let octaves: Vec<f64> = origins.iter().map(|origin| libm::log2(origin.scale)).collect();
         let darkest = octaves.iter().copied().fold(f64::INFINITY, f64::min);
         let octaves: Vec<u32> = octaves.iter().map(|octave| (octave - darkest) as u32).collect();
         let noise = vec![1.0; 1 + octaves.iter().max().map_or(0, |&octave| octave as usize)];

@@ -76,7 +76,7 @@ const COSINE_LOBE: [f64; COUNT] = {
 /// A point of the unit square as a direction, uniform over the sphere.
 pub(super) fn uniform_direction([height, turn]: [f64; 2]) -> DVec3 {
     let z = 1.0 - 2.0 * height;
-    let (sine, cosine) = (2.0 * PI * turn).sin_cos();
+    let (sine, cosine) = libm::sincos(2.0 * PI * turn);
     let across = (1.0 - z * z).max(0.0).sqrt();
     DVec3::new(across * cosine, across * sine, z)
 }

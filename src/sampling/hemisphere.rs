@@ -30,7 +30,7 @@ pub(crate) struct HemisphereSamples {
 /// to the cosine.
 pub(crate) fn cosine_direction(normal: DVec3, [radius2, turn]: [f64; 2]) -> DVec3 {
     let (tangent, bitangent) = normal.any_orthonormal_pair();
-    let (sin, cos) = (TAU * turn).sin_cos();
+    let (sin, cos) = libm::sincos(TAU * turn);
     radius2.sqrt() * (tangent * cos + bitangent * sin) + normal * (1.0 - radius2).sqrt()
 }
 
@@ -73,7 +73,7 @@ impl HemisphereSamples {
     fn from_points(count: u32, point: impl Fn(u32) -> [f64; 2]) -> HemisphereSamples {
         let direction = |k: u32| {
             let [radius2, phi] = point(k);
-            let (sin, cos) = (TAU * phi).sin_cos();
+            let (sin, cos) = libm::sincos(TAU * phi);
             [cos * radius2.sqrt(), sin * radius2.sqrt(), (1.0 - radius2).sqrt()]
         };
         HemisphereSamples { directions: (0..count).map(direction).collect() }
@@ -98,7 +98,7 @@ impl HemisphereSamples {
         rotation: f64,
     ) -> impl Iterator<Item = DVec3> + '_ {
         let (x, y) = normal.any_orthonormal_pair();
-        let (sin, cos) = (TAU * rotation).sin_cos();
+        let (sin, cos) = libm::sincos(TAU * rotation);
         let (x, y) = (x * cos + y * sin, y * cos - x * sin);
         let directions = &self.directions[range.start as usize..range.end as usize];
         directions.iter().map(move |d| x * d[0] + y * d[1] + normal * d[2])

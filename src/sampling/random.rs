@@ -12,5 +12,5 @@ pub(crate) fn random_numbers(words: &[u64]) -> Rng {
 /// A normal deviate by Box and Muller (1958).
 #[cfg(test)]
 pub(crate) fn normal_deviate(rng: &mut Rng) -> f64 {
-    (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (std::f64::consts::TAU * rng.f64()).cos()
+    (-2.0 * libm::log(1.0 - rng.f64())).sqrt() * libm::cos(std::f64::consts::TAU * rng.f64())
 }

@@ -48,9 +48,9 @@ impl CellRotation {
     /// to rounding: a million scene sizes from the origin, rounding carries a few points in a
     /// hundred thousand to another cell.
     pub fn at(&self, position: DVec3, near: f64) -> f64 {
-        let size_log2 = (near / self.size).log2() + DOUBLING_PHASE;
+        let size_log2 = libm::log2(near / self.size) + DOUBLING_PHASE;
         // Cell numbers below 2⁴⁰ are exact.
-        let cells_per_unit = (-(size_log2.floor() + 3.0).max(-40.0)).exp2() / self.size;
+        let cells_per_unit = libm::exp2(-(size_log2.floor() + 3.0).max(-40.0)) / self.size;
         let cell = ((position - self.low) * cells_per_unit).round().as_i64vec3();
         let mix = |hash: u64, x: i64| split_mix64(hash ^ x as u64);
         unit_interval(cell.to_array().into_iter().fold(0, mix))

@@ -196,7 +196,7 @@ impl Shell {
         let area: f64 = areas().sum();
         // A duplicated sheet; a ball has 0.094, a plate with a thickness of 10⁻⁶ of its width some
         // 10⁻⁷.
-        if volume.is_nan() || volume.abs() <= 1e-9 * area.powf(1.5) {
+        if volume.is_nan() || volume.abs() <= 1e-9 * libm::pow(area, 1.5) {
             return None;
         }
         let flipped = volume < 0.0;
@@ -308,7 +308,7 @@ fn solid_angle(corners: [DVec3; 3], point: DVec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner - point);
     let [x, y, z] = [a.length(), b.length(), c.length()];
     let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
-    2.0 * a.dot(b.cross(c)).atan2(below)
+    2.0 * libm::atan2(a.dot(b.cross(c)), below)
 }
 
 /// The clear panes and bodies of `scene`; none if it has none.
@@ -321,6 +321,6 @@ pub(super) fn clear_panes(scene: &Scene) -> Option<ClearPanes> {
         return None;
     }
     let glass = GlassBodies::new(scene);
-    let transmittance = |t: usize| Some(of(t)?.powf(glass.crossing(t)));
+    let transmittance = |t: usize| Some(of(t)?.map(|share| libm::pow(share, glass.crossing(t))));
     Some(ClearPanes { transmittance: (0..count).map(transmittance).collect() })
 }

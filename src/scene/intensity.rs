@@ -117,7 +117,9 @@ impl IntensityDistribution {
             Pole::C0 => [z, y, x],
             Pole::C90 => [z, x, y],
         };
-        let Some((row, down)) = cell(&self.polar, x.hypot(y).atan2(z)) else { return 0.0 };
+        let Some((row, down)) = cell(&self.polar, libm::atan2(libm::hypot(x, y), z)) else {
+            return 0.0;
+        };
         let at = |column: usize| {
             let values = &self.values[column * self.polar.len() + row..];
             values[0] + down * (values[1] - values[0])
@@ -126,7 +128,7 @@ impl IntensityDistribution {
             return at(0);
         }
         let first = self.azimuths[0];
-        let azimuth = first + (y.atan2(x) - first).rem_euclid(TAU);
+        let azimuth = first + (libm::atan2(y, x) - first).rem_euclid(TAU);
         let Some((column, across)) = cell(&self.azimuths, azimuth) else {
             return if self.is_closed() { at(0) } else { 0.0 };
         };
@@ -146,7 +148,8 @@ impl IntensityDistribution {
             let values = &self.values[column * self.polar.len()..];
             let ring = |(angles, values): (&[f64], &[f64])| {
                 let (middle, half) = (angles[0].midpoint(angles[1]), (angles[1] - angles[0]) / 2.0);
-                let (even, odd) = (middle.sin() * half.sin(), middle.cos() * bend(half));
+                let (even, odd) =
+                    (libm::sin(middle) * libm::sin(half), libm::cos(middle) * bend(half));
                 values[0] * (even - odd) + values[1] * (even + odd)
             };
             self.polar.windows(2).zip(values.windows(2)).map(ring).sum()
@@ -211,7 +214,7 @@ fn bend(h: f64) -> f64 {
             let inner = 1.0 / 840.0 - square / 45360.0;
             square * (1.0 / 3.0 - square * (1.0 / 30.0 - square * inner))
         }
-        false => h.sin() / h - h.cos(),
+        false => libm::sin(h) / h - libm::cos(h),
     }
 }
 

@@ -135,7 +135,7 @@ impl Luminaire {
         match self.opening.is_round {
             false => length * width * z + height * (width * x + length * y),
             // An ellipse, and the width of its shadow.
-            true => PI / 4.0 * length * width * z + height * (length * y).hypot(width * x),
+            true => PI / 4.0 * length * width * z + height * libm::hypot(length * y, width * x),
         }
     }
 
@@ -152,7 +152,7 @@ impl Luminaire {
         let [x, y] = match self.opening.is_round {
             false => [x - 0.5, y - 0.5],
             true => {
-                let (sine, cosine) = (std::f64::consts::TAU * y).sin_cos();
+                let (sine, cosine) = libm::sincos(std::f64::consts::TAU * y);
                 [0.5 * x.sqrt() * cosine, 0.5 * x.sqrt() * sine]
             }
         };

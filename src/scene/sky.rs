@@ -58,7 +58,7 @@ impl Sun {
     /// one over the disc.
     pub(crate) fn towards(&self, [x, y]: [f64; 2]) -> DVec3 {
         let (right, up) = self.direction.any_orthonormal_pair();
-        let (sine, cosine) = (TAU * y).sin_cos();
+        let (sine, cosine) = libm::sincos(TAU * y);
         (self.direction + (right * cosine + up * sine) * (x.sqrt() * Sun::tangent())).normalize()
     }
 }
@@ -159,7 +159,7 @@ impl Sky {
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let radiance = |k: u32| {
             let [square, turn] = [k / count, k % count].map(|k| (f64::from(k) + 0.5) / 512.0);
-            let (sine, cosine) = (TAU * turn).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * turn);
             let across = square.sqrt() * (tangent * cosine + bitangent * sine);
             self.radiance(across + normal * (1.0 - square).sqrt())
         };

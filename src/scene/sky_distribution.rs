@@ -136,11 +136,11 @@ impl SkyDistribution {
         let [a, b, mut c, mut d, e] = PEREZ[line].map(linear);
         if line == 0 {
             let [[c1, c2, c3, c4], [d1, d2, d3, d4]] = [PEREZ[0][2], PEREZ[0][3]];
-            c = ((brightness * (c1 + c2 * sun_zenith)).powf(c3)).exp() - c4;
-            d = -(brightness * (d1 + d2 * sun_zenith)).exp() + d3 + brightness * d4;
+            c = libm::exp(libm::pow(brightness * (c1 + c2 * sun_zenith), c3)) - c4;
+            d = -libm::exp(brightness * (d1 + d2 * sun_zenith)) + d3 + brightness * d4;
         }
         // The paper has 1 + c exp(d χ) + e cos² χ: the same up to a factor.
-        let factor = 1.0 + c * (d * FRAC_PI_2).exp();
+        let factor = 1.0 + c * libm::exp(d * FRAC_PI_2);
         let graded = [a, b, c / factor, d, e / factor];
         graded.iter().all(|x| x.is_finite()).then_some(SkyDistribution(Kind::Graded(graded)))
     }
@@ -152,9 +152,9 @@ impl SkyDistribution {
             Kind::Traditional => 1.0 + 2.0 * up,
             Kind::Graded([a, b, c, d, e]) => {
                 // It diverges at the horizon for b above 0.
-                let gradation = 1.0 + a * (b / up.max(0.01)).exp();
-                let angle = from_sun.clamp(-1.0, 1.0).acos();
-                let scattered = c * ((d * angle).exp() - (d * FRAC_PI_2).exp());
+                let gradation = 1.0 + a * libm::exp(b / up.max(0.01));
+                let angle = libm::acos(from_sun.clamp(-1.0, 1.0));
+                let scattered = c * (libm::exp(d * angle) - libm::exp(d * FRAC_PI_2));
                 gradation * (1.0 + scattered + e * from_sun * from_sun)
             }
         };

@@ -58,10 +58,10 @@ impl SkyMap {
         let across = parts(TAU / width as f64);
         let down = parts(PI / height as f64);
         for y in 0..height * down {
-            let (sine, cosine) = ((y as f64 + 0.5) / (height * down) as f64 * PI).sin_cos();
+            let (sine, cosine) = libm::sincos((y as f64 + 0.5) / (height * down) as f64 * PI);
             for x in 0..width * across {
                 let turned = (x as f64 + 0.5) / (width * across) as f64 * TAU - PI;
-                let (s, c) = turned.sin_cos();
+                let (s, c) = libm::sincos(turned);
                 let k = index(DVec3::new(sine * s, sine * c, cosine), side);
                 sums[k] += pixels[y / down * width + x / across] * sine;
                 weights[k] += sine;

@@ -69,7 +69,8 @@ impl SolarIrradiance {
     /// (Spencer 1971, first harmonic).
     pub fn extraterrestrial_on(day: u32) -> f64 {
         let turn = std::f64::consts::TAU * (f64::from(day) - 1.0) / 365.0;
-        SolarIrradiance::SOLAR_CONSTANT * (1.00011 + 0.034221 * turn.cos() + 0.00128 * turn.sin())
+        SolarIrradiance::SOLAR_CONSTANT
+            * (1.00011 + 0.034221 * libm::cos(turn) + 0.00128 * libm::sin(turn))
     }
 
     fn zenith(&self) -> f64 {
@@ -86,7 +87,7 @@ impl SolarIrradiance {
     /// Δ: what the model is fitted to lies between 0.01 and 0.6, to which it is limited.
     pub fn brightness(&self) -> f64 {
         let beyond = 96.07995 - self.zenith().to_degrees();
-        let air_mass = 1.0 / (self.zenith().cos() + 0.50572 * beyond.powf(-1.6364));
+        let air_mass = 1.0 / (libm::cos(self.zenith()) + 0.50572 * libm::pow(beyond, -1.6364));
         (air_mass * self.diffuse_horizontal / self.extraterrestrial).clamp(0.01, 0.6)
     }
 
@@ -101,13 +102,13 @@ impl SolarIrradiance {
     /// Luminous efficacy where the dew point is this many degrees Celsius: a measure of the water
     /// in the air, 2 cm at 11 °C (Wright, Perez and Michalsky 1989).
     pub fn efficacy(&self, dew_point: f64) -> LuminousEfficacy {
-        let water = (0.07 * dew_point - 0.075).exp();
+        let water = libm::exp(0.07 * dew_point - 0.075);
         let (zenith, brightness) = (self.zenith(), self.brightness());
         let class = clearness_class(self.clearness());
         let of = |[a, b, c, d]: [f64; 4], [x, y]: [f64; 2]| a + b * water + c * x + d * y;
         LuminousEfficacy {
-            direct: of(EFFICACY[1][class], [(5.73 * zenith - 5.0).exp(), brightness]).max(0.0),
-            diffuse: of(EFFICACY[0][class], [zenith.cos(), brightness.ln()]).max(0.0),
+            direct: of(EFFICACY[1][class], [libm::exp(5.73 * zenith - 5.0), brightness]).max(0.0),
+            diffuse: of(EFFICACY[0][class], [libm::cos(zenith), libm::log(brightness)]).max(0.0),
         }
     }
 }

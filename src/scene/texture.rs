@@ -108,7 +108,7 @@ impl Texture {
             return self.whole_mean();
         }
         let texels = area * f64::from(self.width) * f64::from(self.height);
-        let level = (0.5 * texels.log2()).max(0.0).min(self.levels.len() as f64) as usize;
+        let level = (0.5 * libm::log2(texels)).max(0.0).min(self.levels.len() as f64) as usize;
         let [columns, rows] = self.level_size(level);
         let size = DVec2::new(self.width.into(), self.height.into()) * 0.5f64.powi(level as i32);
         let uv = if clamped { uv.clamp(DVec2::ZERO, DVec2::ONE) } else { uv - uv.floor() };
@@ -145,7 +145,7 @@ impl Texture {
         let origin = if clamped { DVec2::ZERO } else { a.min(b).min(c).floor() };
         let in_texels = |p: DVec2| DVec2::new(p.x - origin.x, 1.0 - (p.y - origin.y)) * size;
         let outline = [a - b, b - c, c - a].map(|edge| (edge * size).length()).iter().sum::<f64>();
-        let level = (outline / cells).log2().max(0.0).min(self.levels.len() as f64) as usize;
+        let level = libm::log2(outline / cells).max(0.0).min(self.levels.len() as f64) as usize;
         // Twice that of a square with this outline, if cells are not larger than the image.
         let crossings = 4.0 * cells;
         let cell = |x, y| self.cell(level, x, y);
@@ -239,7 +239,7 @@ fn linear() -> &'static [f64; 256] {
     LINEAR.get_or_init(|| {
         std::array::from_fn(|k| {
             let x = k as f64 / 255.0;
-            if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+            if x <= 0.04045 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }
         })
     })
 }

@@ -13,7 +13,6 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -26,7 +25,7 @@ use super::{Progress, SolveSession};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::{Mesh, NodeId};
-use crate::progress::StopReason;
+use crate::progress::{Instant, StopReason};
 use crate::scene::Rgb;
 use crate::visibility::buried;
 

@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use super::flux_state::{FluxState, ReceivedLight};
 use super::method_state::MethodState;
@@ -14,7 +13,7 @@ use super::{Ledger, Progress, Solution, Solver};
 use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
-use crate::progress::StopReason;
+use crate::progress::{Instant, StopReason};
 
 /// A solve that advances by batches of rows: [`Solver::begin`] creates it.
 ///

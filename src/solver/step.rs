@@ -6,7 +6,6 @@
 //! session that called it.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +15,7 @@ use super::row_cache::RowCache;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row};
 use crate::mesh::NodeId;
+use crate::progress::Instant;
 use crate::scene::Rgb;
 
 /// Counters of a solve.

@@ -158,7 +158,7 @@ impl Assembler {
         let of_closed_forms = unoccluded.error / self.root_share(from);
         Estimate {
             value: unoccluded.value + occluded.value,
-            error: of_closed_forms.hypot(occluded.error),
+            error: libm::hypot(of_closed_forms, occluded.error),
         }
     }
 }

@@ -230,7 +230,7 @@ impl Outlines {
             if sine < -COINCIDENCE_TOLERANCE || (cosine < 0.0 && sine <= COINCIDENCE_TOLERANCE) {
                 return false;
             }
-            around += sine.atan2(cosine);
+            around += libm::atan2(sine, cosine);
         }
         around < 1.5 * std::f64::consts::TAU
     }

@@ -147,7 +147,7 @@ fn changed_row(before: &[Factor], values: impl Iterator<Item = (u32, f64)>) -> C
     for (to, value) in values {
         let known = before.next_if(|f| f.to == to);
         let change = value - known.map_or(0.0, |f| f.value);
-        let error = known.map_or(value, |f| f.error.hypot(change));
+        let error = known.map_or(value, |f| libm::hypot(f.error, change));
         row.sum_of_squares += change * change;
         row.max_change = row.max_change.max(change.abs());
         row.factors.push(Factor { to, value, error });

@@ -156,7 +156,7 @@ impl PairEstimator<'_> {
         let per_ray = 2.0 / self.ray_density(small);
         Estimate {
             value: (past_known.value - per_ray * f64::from(hidden)).max(0.0),
-            error: past_known.error.hypot(per_ray * f64::from(likely).sqrt()),
+            error: libm::hypot(past_known.error, per_ray * f64::from(likely).sqrt()),
         }
     }
 
@@ -193,10 +193,10 @@ fn with_missed(exchange: Estimate, hits: [u32; 2], density: f64) -> Estimate {
     // With V the exchange, and μ = density · V hits a half, a half misses with exp(−μ) if rays are
     // independent, more rarely if they are even. Then the mean is 0 if both miss, and half of V and
     // a count if one does: a variance of V² exp(−μ) (exp(−μ) + 1/μ) / 2.
-    let missed = (-density * exchange.value).exp();
+    let missed = libm::exp(-density * exchange.value);
     let square = exchange.value * exchange.value;
     let of_chance = 0.5 * missed * (square * missed + exchange.value / density);
-    Estimate { value, error: exchange.error.hypot(of_chance.max(0.0).sqrt()) }
+    Estimate { value, error: libm::hypot(exchange.error, of_chance.max(0.0).sqrt()) }
 }
 
 /// Number of rays of both halves that hit polygon `s`, by an ascending list.

@@ -21,7 +21,7 @@ pub(super) struct ScenePolygons {
 impl ScenePolygons {
     /// The polygons of `scene`. Groups of index `two_sided` have two sides, each a row.
     pub fn new(scene: &Scene, two_sided: &[usize]) -> ScenePolygons {
-        let unit = scene.bounds().longest_side().log2().floor().exp2();
+        let unit = libm::exp2(libm::log2(scene.bounds().longest_side()).floor());
         let fronts = Fronts::new(scene, unit, two_sided);
         let MergedTriangles { polygons, of_triangle: blocker_of_triangle } =
             convex_polygons(scene, unit, Merge::AcrossGroups);

@@ -120,7 +120,7 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
         true => 2.0 / points,
         false => 0.5 * range / points,
     };
-    Estimate { value, error: of_parts.hypot(sharpness * unmet) }
+    Estimate { value, error: libm::hypot(of_parts, sharpness * unmet) }
 }
 
 /// Ratio of the standard error of the mean of all points to that of eight independent parts. Where
@@ -129,7 +129,7 @@ fn visible_share(parts: &[Seen; PARTS], count: u32, sharpness: f64) -> Estimate 
 /// order of n^(−3/2)), so that the error of all is 8^(−3/4) of that of independent parts.
 fn dependence(sharpness: f64) -> f64 {
     // Student's t for 7 degrees of freedom and 95 %, over the 2 of a large sample.
-    (2.365 / 2.0 * sharpness).max((PARTS as f64).powf(-0.75))
+    (2.365 / 2.0 * sharpness).max(libm::pow(PARTS as f64, -0.75))
 }
 
 /// Minimum distance on the first polygon of `pair` over which the visibility of the other may

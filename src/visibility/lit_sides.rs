@@ -188,7 +188,7 @@ impl<'a> LitSides<'a> {
             // 5 % given the share of its sheet.
             let is_darker = |&side: &SideIndex| {
                 let (own, share) = (light.of(side), light.of_sheet(side).share());
-                own.hits == 0.0 && (1.0 - share).powf(own.points) < 0.05
+                own.hits == 0.0 && libm::pow(1.0 - share, own.points) < 0.05
             };
             // Where no walk from either side reaches light and that is improbable for one if lit,
             // both are dark.

@@ -1,9 +1,7 @@
 //! Weather files.
 
-use std::path::Path;
-
 use radiosity::ErrorKind;
-use radiosity::io::{Weather, epw_from_text};
+use radiosity::io::{Input, Weather, read_epw};
 
 use crate::common::weather::{DAYS, epw_at, row};
 
@@ -12,7 +10,7 @@ fn epw(irradiance: impl Fn(u32, u32) -> [f64; 2]) -> String {
 }
 
 fn read(text: &str) -> Weather {
-    epw_from_text(Path::new("place.epw"), text).unwrap()
+    read_epw(Input::bytes("place.epw", text.as_bytes())).unwrap()
 }
 
 #[test]
@@ -92,7 +90,7 @@ fn what_is_wrong_is_said_with_line_and_field() {
         (head.to_string(), &["no lines of weather"]),
         (String::new(), &["no line LOCATION"]),
     ] {
-        let error = epw_from_text(Path::new("place.epw"), &text).unwrap_err();
+        let error = read_epw(Input::bytes("place.epw", text.as_bytes())).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Scene);
         for word in words {
             assert!(error.to_string().contains(word), "'{word}' not in: {error}");

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 use radiosity::ErrorKind;
-use radiosity::io::photometry_from_bytes;
+use radiosity::io::{Input, read_photometry};
 
 /// Reads a photometric file. Answers whether it was taken; panics where what it holds or an error
 /// breaks its promises.
 pub fn try_luminaire(input: &[u8]) -> bool {
-    let lamp = match photometry_from_bytes("it.ies", input.to_vec()) {
+    let lamp = match read_photometry(Input::bytes("it.ies", input)) {
         Ok(lamp) => lamp,
         Err(e) => {
             assert_eq!(e.kind(), ErrorKind::Scene, "{e}");

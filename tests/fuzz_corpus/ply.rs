@@ -1,24 +1,19 @@
 //! What the fuzz target `ply` does with an input, and the replay of its corpus.
 
-use std::fs;
-
+use radiosity::io::Input;
 use radiosity::{ErrorKind, VertexMesh, read_ply, write_ply};
 
 /// Reads the PLY file, and if it is one, writes it and reads that. Answers whether it was taken;
 /// panics where a mesh or an error breaks its promises.
 pub fn try_ply(input: &[u8]) -> bool {
-    let path = std::env::temp_dir().join(format!("radiosity-fuzz-{}.ply", std::process::id()));
-    fs::write(&path, input).unwrap();
-    let read = read_ply(&path);
-    let accepted = match &read {
+    match read_ply(Input::bytes("it.ply", input)) {
         Ok(mesh) => {
-            check(mesh, input.len());
-            write_ply(&path, mesh).unwrap();
-            let again = read_ply(&path).expect("what is written can be read");
-            assert_eq!(
-                (again.faces, again.positions.len()),
-                (mesh.faces.clone(), mesh.positions.len())
-            );
+            check(&mesh, input.len());
+            let mut bytes = vec![];
+            write_ply(&mut bytes, &mesh).unwrap();
+            let again = read_ply(Input::bytes("it.ply", &bytes));
+            let again = again.expect("what is written can be read");
+            assert_eq!((again.faces, again.positions.len()), (mesh.faces, mesh.positions.len()));
             true
         }
         Err(e) => {
@@ -28,9 +23,7 @@ pub fn try_ply(input: &[u8]) -> bool {
             assert!(message.len() < 4000, "{message}");
             false
         }
-    };
-    fs::remove_file(&path).unwrap();
-    accepted
+    }
 }
 
 /// Every number is finite, every corner is there, and there is no more of anything than bytes.

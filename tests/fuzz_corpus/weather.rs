@@ -1,15 +1,12 @@
 //! What the fuzz target `weather` does with an input, and the replay of its corpus.
 
-use std::path::Path;
-
 use radiosity::ErrorKind;
-use radiosity::io::epw_from_text;
+use radiosity::io::{Input, read_epw};
 
 /// Reads a weather file. Answers whether it was taken; panics where what it holds or an error
 /// breaks its promises.
 pub fn try_weather(input: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(input);
-    let weather = match epw_from_text(Path::new("it.epw"), &text) {
+    let weather = match read_epw(Input::bytes("it.epw", input)) {
         Ok(weather) => weather,
         Err(e) => {
             assert_eq!(e.kind(), ErrorKind::Scene, "{e}");

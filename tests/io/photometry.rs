@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use radiosity::io::{Photometry, PhotometrySettings, photometry_from_bytes};
+use radiosity::io::{Input, Photometry, PhotometrySettings, read_photometry};
 use radiosity::{Error, ErrorKind};
 
 fn read(text: &str) -> Photometry {
@@ -11,7 +11,7 @@ fn read(text: &str) -> Photometry {
 }
 
 fn try_read(text: &str) -> Result<Photometry, Error> {
-    photometry_from_bytes("lamp", text.as_bytes().to_vec())
+    read_photometry(Input::bytes("lamp", text.as_bytes()))
 }
 
 /// The message of what is refused.
@@ -169,7 +169,7 @@ fn oddities_of_lm_63_are_understood() {
     same(&plain().replace("500 1 3 1", "500.0 1.0 3.0 1.0"));
     // Latin-1 in a name.
     let latin: Vec<u8> = plain().replace("Lamp", "L\u{e4}mp").chars().map(|c| c as u8).collect();
-    let lamp = photometry_from_bytes("lamp", latin).unwrap();
+    let lamp = read_photometry(Input::bytes("lamp", &latin)).unwrap();
     assert_eq!((lamp.name.as_str(), &lamp.intensity), ("Firm L\u{e4}mp", &whole.intensity));
     // Absolute photometry.
     assert_eq!(same(&plain().replace("2 500", "1 -1")).lamp_flux, None);
@@ -336,7 +336,7 @@ fn oddities_of_eulumdat_are_understood() {
     assert!(warned(&read(&(plain.clone() + "\r\n1\r\n2"))).contains("2 numbers"));
     let mut bytes = plain.clone().into_bytes();
     bytes[0] = 0xdc;
-    assert_eq!(photometry_from_bytes("lamp", bytes).unwrap().name, "\u{dc}irm Lamp");
+    assert_eq!(read_photometry(Input::bytes("lamp", &bytes)).unwrap().name, "\u{dc}irm Lamp");
 }
 
 /// [`ldt`] of an even light with these sets of lamps: how many, lm and W.
@@ -359,7 +359,7 @@ fn one_of_several_sets_of_lamps_is_chosen() {
     let choose = |text: &str, lamp_set| {
         let mut settings = PhotometrySettings::default();
         settings.lamp_set = lamp_set;
-        settings.read_bytes("lamp", text.as_bytes().to_vec())
+        settings.read(Input::bytes("lamp", text.as_bytes()))
     };
     let sets = with_lamp_sets(&[(1, "3200", 36), (2, "8600", 116), (1, "5000", 58)]);
     let error = choose(&sets, None).unwrap_err().to_string();

@@ -137,7 +137,7 @@ impl RayGather {
             let all = hemisphere.mean() + direct.mean() + of_luminaires;
             let allowed = noise * all.length().max(self.dim);
             let errors = [direct.error(), hemisphere.error()];
-            if errors[0].hypot(errors[1]) <= allowed {
+            if libm::hypot(errors[0], errors[1]) <= allowed {
                 break;
             }
             let is_doubled = match errors[0] > errors[1] {
@@ -149,8 +149,8 @@ impl RayGather {
             }
         }
         let (rays, count) = (hemisphere.sums(), hemisphere.count());
-        let noise = direct.error().hypot(hemisphere.error());
-        let noise = noise.hypot(direct_light.error()).hypot(of_least);
+        let noise = libm::hypot(direct.error(), hemisphere.error());
+        let noise = libm::hypot(libm::hypot(noise, direct_light.error()), of_least);
         let directional = direct.sums().of_sun() + of_luminaires;
         rays.samples(count, [direct.mean() + of_luminaires, directional], noise)
     }
@@ -162,7 +162,7 @@ impl RayGather {
             return self.min_rays;
         }
         let [least, most] = RAYS_OF_WEIGHTS;
-        let share = weight.powf(RAYS_BY_WEIGHT).clamp(least, most);
+        let share = libm::pow(weight, RAYS_BY_WEIGHT).clamp(least, most);
         let rays = f64::from(self.min_rays) * share;
         power_of_two(rays).min(hemisphere::MAX_RAYS)
     }
@@ -284,7 +284,7 @@ pub(crate) fn min_rays(count: u32) -> Result<u32, Error> {
 
 /// The power of two nearest to `rays`, on a scale of powers; 2 at least.
 fn power_of_two(rays: f64) -> u32 {
-    1 << rays.log2().round().max(1.0) as u32
+    1 << libm::log2(rays).round().max(1.0) as u32
 }
 
 /// Maximum number of rays of a point with at least `min_rays`: 16 times as many for a finite

@@ -10,7 +10,6 @@
 //! limits of the device allow, and a half or a quarter of them where memory is short.
 
 use std::f64::consts::FRAC_PI_2;
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -32,7 +31,7 @@ use crate::error::{Error, ErrorKind};
 use crate::form_factor::{Entry, FormFactors, Row, resolution_policy};
 use crate::hemicube::{self, Face, Frame, RESOLUTIONS};
 use crate::mesh::{Mesh, NodeId};
-use crate::progress::Timings;
+use crate::progress::{Instant, Timings};
 use crate::sampling::hash::{split_mix64_nth, unit_interval};
 use crate::visibility::offset;
 

@@ -13,7 +13,6 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError};
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -33,6 +32,7 @@ use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
 use crate::mesh::Mesh;
+use crate::progress::Instant;
 use crate::sampling::hemisphere::HemisphereSamples;
 use crate::sampling::rotation::{CellRotation, second_rotation};
 use crate::scene::Rgb;

@@ -101,7 +101,11 @@ impl TracedArrays {
         let brightest = lamps.chain([PI * sky.brightest()]).fold(0.0, f64::max);
         let mut arrays = TracedArrays {
             coordinates: SplitFloat::new(scene),
-            radiance_unit: if brightest > 0.0 { brightest.log2().floor().exp2() } else { 1.0 },
+            radiance_unit: if brightest > 0.0 {
+                libm::exp2(libm::log2(brightest).floor())
+            } else {
+                1.0
+            },
             nodes: vec![],
             triangles: Vec::with_capacity(scene.triangles().len()),
             info: TracedSceneInfo { panes: NOTHING, ..Zeroable::zeroed() },

@@ -151,7 +151,7 @@ impl Canvas<'_> {
             let along = |d: f64| (x + d * dx, y + d * dy);
             self.line(&[along(-across), (x, y)], LIGHT, 1.0)?;
             self.line(&[(x, y), along(tick)], BLACK, 1.0)?;
-            let way = share * (high.0 - low.0).hypot(high.1 - low.1);
+            let way = share * libm::hypot(high.0 - low.0, high.1 - low.1);
             if way - last >= 16.0 {
                 let away = if side == Side::Below { 12.0 } else { 4.0 };
                 self.text(&text, along(tick + away), Font::new(14.0, GREY).anchor(anchor))?;

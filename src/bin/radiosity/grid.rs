@@ -169,28 +169,11 @@ impl Options {
 
     /// What is measured; none where Ctrl-C stopped it.
     fn measure(&self, grids: &[Placed], light: &Light) -> Result<Option<Vec<MeasuredGrid>>, Error> {
-        let lit = &light.baked.light;
+        let (lit, grids) = (&light.baked.light, grids.iter().map(|(_, grid)| grid.clone()));
+        let grids: Vec<MeasuringGrid> = grids.collect();
         progress::of_stoppable("points", |report| {
-            let mut all: Vec<Option<MeasuredGrid>> = vec![None; grids.len()];
-            // With more rays where gathering alone would take most of the error.
-            for share in [0.25, 0.125, 0.0625, 0.03125] {
-                let is_noisy = |measured: &MeasuredGrid| {
-                    measured.relative_error() >= 0.25 * self.light.error()
-                };
-                let open: Vec<usize> =
-                    (0..grids.len()).filter(|&k| all[k].as_ref().is_none_or(is_noisy)).collect();
-                if open.is_empty() {
-                    break;
-                }
-                let noise = (share * self.light.error()).min(1.0);
-                let mut gatherer = light.device.gather_to_noise(lit, noise)?;
-                for k in open {
-                    let measured = grids[k].1.measure(lit, &mut *gatherer, &mut *report)?;
-                    let Some(measured) = measured else { return Ok(None) };
-                    all[k] = Some(measured);
-                }
-            }
-            Ok(Some(all.into_iter().flatten().collect()))
+            let mut gatherers = |noise| light.device.gather_to_noise(lit, noise);
+            MeasuringGrid::measure_to(&grids, lit, &mut gatherers, self.light.error(), report)
         })
     }
 

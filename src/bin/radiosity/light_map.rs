@@ -130,7 +130,7 @@ pub struct Shown {
 
 impl Shown {
     fn total(&self) -> f64 {
-        self.between.value.hypot(self.of_light)
+        libm::hypot(self.between.value, self.of_light)
     }
 }
 
@@ -336,7 +336,7 @@ impl Options {
             let lost = 100.0 * shown.value;
             eprintln!("{pixels} texels along a side lose {lost:.2} % of the light between them");
             // The error falls no faster than texels become small.
-            let times = (shown.value / between).log2().floor().max(1.0).exp2();
+            let times = libm::exp2(libm::log2(shown.value / between).floor().max(1.0));
             let pixels = (f64::from(pixels) * times).min(f64::from(*PIXELS.end()));
             coarser = Some((map, shown));
             atlas = progress::of_stage("laying out surfaces", || {

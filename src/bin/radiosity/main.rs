@@ -17,6 +17,9 @@
 //! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 3 when
 //! results are written whose error is larger than what was asked for, 130 when Ctrl-C stopped it.
 
+// The same bytes on every platform: see clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 /// Prints a line, also where nobody reads on, as behind `| head`: `println!` panics there.
 macro_rules! say {
     ($($line:tt)*) => {{

@@ -9,7 +9,7 @@ use radiosity::{Error, Rgb, Sky, Sun};
 
 use crate::args;
 use crate::sky::{Kind, Resolved, bad};
-use crate::sun::GivenSun;
+use crate::sun::{GivenSun, angle_between};
 
 /// Irradiance of sun and sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ impl MeasuredSky {
         })?;
         let direction = place.direction(up, north)?;
         let time = place.time()?;
-        let sun_zenith = up.angle_between(direction);
+        let sun_zenith = angle_between(up, direction);
         let light = SolarIrradiance {
             direct_normal: self.direct_normal,
             diffuse_horizontal: self.diffuse_horizontal,

@@ -114,7 +114,7 @@ fn share(done: usize, of: usize) -> f64 {
 /// Of the way from 1 to the goal, on a logarithmic scale: each order of magnitude takes about as
 /// long as the one before.
 fn shot_share(unshot: f64, goal: f64) -> f64 {
-    let share = unshot.ln() / goal.ln();
+    let share = libm::log(unshot) / libm::log(goal);
     if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 

@@ -10,7 +10,7 @@ use radiosity::{Error, ErrorKind, Rgb, Scene, Sky, Sun};
 
 use crate::args::{self, Parsed, Stop, give};
 use crate::measured_sky::MeasuredSky;
-use crate::sun::{GivenSun, SunPlace, sun_at, sun_towards};
+use crate::sun::{GivenSun, SunPlace, angle_between, sun_at, sun_towards};
 
 /// What `--sky` takes.
 const SKIES: &str = "a radiance r,g,b, none, overcast, cie1 to cie15, perez:CLEARNESS,BRIGHTNESS, \
@@ -153,7 +153,7 @@ impl SkyOptions {
             Some(Kind::Overcast) => spread(Some(SkyDistribution::OVERCAST))?,
             Some(Kind::Cie(number)) => spread(SkyDistribution::cie(*number))?,
             Some(Kind::Perez(clearness, brightness)) => {
-                let angle = up.normalize().angle_between(towards_sun);
+                let angle = angle_between(up, towards_sun);
                 spread(SkyDistribution::perez(*clearness, *brightness, angle))?
             }
             Some(Kind::Picture(path)) => {

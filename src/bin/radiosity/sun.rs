@@ -56,7 +56,7 @@ impl GivenSun {
         let time = self.time()?.ok_or_else(|| wrong("no time".into()))?;
         let sky = Compass::new(up, north)?;
         let direction = site.towards_sun(&time, &sky).map_err(wrong)?;
-        let elevation = FRAC_PI_2 - direction.angle_between(sky.up);
+        let elevation = FRAC_PI_2 - angle_between(direction, sky.up);
         if elevation <= 0.0 {
             let found = format!("the sun {:.1}° below the horizon", -elevation.to_degrees());
             return Err(bad("sun-at", found, "give a time at which it is day"));
@@ -84,6 +84,11 @@ fn bad(option: &str, found: String, remedy: &str) -> Error {
 pub struct Compass {
     pub up: DVec3,
     north: DVec3,
+}
+
+/// Angle between two directions of any length, radians.
+pub fn angle_between(a: DVec3, b: DVec3) -> f64 {
+    libm::acos((a.dot(b) / (a.length() * b.length())).clamp(-1.0, 1.0))
 }
 
 impl Compass {
@@ -114,8 +119,8 @@ impl Site {
         let (elevation, azimuth) =
             (FRAC_PI_2 - sun.zenith_angle().to_radians(), sun.azimuth().to_radians());
         let Compass { up, north } = *compass;
-        let level = azimuth.cos() * north + azimuth.sin() * north.cross(up);
-        Ok(elevation.cos() * level + elevation.sin() * up)
+        let level = libm::cos(azimuth) * north + libm::sin(azimuth) * north.cross(up);
+        Ok(libm::cos(elevation) * level + libm::sin(elevation) * up)
     }
 }
 

@@ -55,7 +55,7 @@ fn parallel_edges(a: Edge, b: Edge) -> f64 {
         if t + h == 0.0 {
             return 0.0;
         }
-        0.25 * ((t - h) * (t + h).ln() - t) + distance * along * along.atan2(distance)
+        0.25 * ((t - h) * libm::log(t + h) - t) + distance * along * libm::atan2(along, distance)
     };
     antiderivative(a.start, b.end) - antiderivative(a.end, b.end) - antiderivative(a.start, b.start)
         + antiderivative(a.end, b.start)
@@ -91,8 +91,8 @@ fn skew_edges(a: Edge, b: Edge) -> f64 {
 fn log_integral(point: DVec3, edge: Edge) -> f64 {
     let (a, b) = (point - edge.start, point - edge.end);
     let distance = a.cross(edge.direction).length();
-    let part = |t: f64, square: f64| if square > 0.0 { 0.5 * t * square.ln() } else { 0.0 };
+    let part = |t: f64, square: f64| if square > 0.0 { 0.5 * t * libm::log(square) } else { 0.0 };
     part(a.dot(edge.direction), a.length_squared())
         - part(b.dot(edge.direction), b.length_squared())
-        + distance * (distance * edge.length).atan2(a.dot(b))
+        + distance * libm::atan2(distance * edge.length, a.dot(b))
 }

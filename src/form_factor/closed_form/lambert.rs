@@ -13,7 +13,7 @@ pub(crate) fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
         let (a, b) = (edge.start - point, edge.end - point);
         let across = a.cross(b - a);
         let sine = across.length();
-        if sine > 0.0 { sine.atan2(a.dot(b)) * normal.dot(across) / sine } else { 0.0 }
+        if sine > 0.0 { libm::atan2(sine, a.dot(b)) * normal.dot(across) / sine } else { 0.0 }
     };
     -edges(corners).map(along_normal).sum::<f64>() / TAU
 }

@@ -40,7 +40,7 @@ impl Cone {
             return None;
         }
         let across = narrow.axis.reject_from_normalized(wide.axis).try_normalize()?;
-        let (sine, cosine) = (half_angle - wide.half_angle).sin_cos();
+        let (sine, cosine) = libm::sincos(half_angle - wide.half_angle);
         Some(Cone { axis: cosine * wide.axis + sine * across, half_angle })
     }
 
@@ -53,13 +53,13 @@ impl Cone {
 
     /// Sine of the half-angle, or 1 beyond a right angle.
     pub fn sine(&self) -> f64 {
-        self.half_angle.min(0.5 * PI).sin()
+        libm::sin(self.half_angle.min(0.5 * PI))
     }
 }
 
 /// Angle between unit vectors, radians.
 pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
-    a.dot(b).clamp(-1.0, 1.0).acos()
+    libm::acos(a.dot(b).clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]

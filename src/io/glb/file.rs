@@ -1,8 +1,7 @@
 //! A glTF binary file in the making: the document, and the views of its binary chunk.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write as _};
-use std::path::Path;
+use std::io;
 
 use glam::Vec3;
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
@@ -16,7 +15,7 @@ use gltf_json::validation::Checked::{self, Valid};
 use gltf_json::{Accessor, Asset, Buffer, Image, Index, Material, Mesh, Root, Scene, Value};
 
 use crate::error::Error;
-use crate::io::{cannot_write, write_file};
+use crate::io::Output;
 
 /// Accessors of the attributes of a primitive.
 pub(super) type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
@@ -194,7 +193,12 @@ impl GlbFile {
     ///
     /// # Errors
     /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB.
-    pub fn write(mut self, path: &Path, top: Node, groups: Vec<Index<Node>>) -> Result<(), Error> {
+    pub fn write(
+        mut self,
+        out: Output<'_>,
+        top: Node,
+        groups: Vec<Index<Node>>,
+    ) -> Result<(), Error> {
         let nodes = vec![self.root.push(Node { children: Some(groups), ..top })];
         let scene = Scene { nodes, name: None, extensions: None, extras: None };
         self.root.scene = Some(self.root.push(scene));
@@ -207,14 +211,14 @@ impl GlbFile {
             extensions: None,
             extras: None,
         });
-        let mut json = self.root.to_vec().map_err(|e| cannot_write(path, e))?;
+        let mut json = self.root.to_vec().map_err(|e| out.cannot_write(e))?;
         json.resize(json.len().next_multiple_of(4), b' ');
         let total = 12 + 8 + json.len() + 8 + binary;
         let Ok(total) = u32::try_from(total) else {
             let found = format!("{total} bytes, where glTF binary has room for 4 GiB");
-            return Err(cannot_write(path, io::Error::new(io::ErrorKind::FileTooLarge, found)));
+            return Err(out.cannot_write(io::Error::new(io::ErrorKind::FileTooLarge, found)));
         };
-        write_file(path, |out| {
+        out.write(|out| {
             let kind = u32::from_le_bytes;
             for word in [kind(*b"glTF"), 2, total, json.len() as u32, kind(*b"JSON")] {
                 out.write_all(&word.to_le_bytes())?;

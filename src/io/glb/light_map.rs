@@ -6,7 +6,6 @@ mod vertices;
 
 use std::collections::BTreeMap;
 use std::io;
-use std::path::Path;
 
 use glam::Vec3;
 use gltf_json::mesh::Semantic;
@@ -21,7 +20,7 @@ use super::materials::{Look, unlit};
 use super::origin;
 use super::settings::GlbSettings;
 use crate::error::Error;
-use crate::io::cannot_write;
+use crate::io::Output;
 use crate::light_map::{LightMap, MapPage};
 use crate::scene::Rgb;
 use vertices::{Primitive, Vertex, primitives};
@@ -41,13 +40,13 @@ use vertices::{Primitive, Vertex, primitives};
 /// # Errors
 /// [`crate::ErrorKind::File`] when the file cannot be written, or would be larger than 4 GiB; those
 /// of [`LightMap::surface`].
-pub fn write_light_map_glb(
-    path: impl AsRef<Path>,
+pub fn write_light_map_glb<'o>(
+    out: impl Into<Output<'o>>,
     map: &LightMap,
     settings: impl Into<GlbSettings>,
 ) -> Result<(), Error> {
-    let (path, settings) = (path.as_ref(), settings.into());
-    let failed = |e| cannot_write(path, io::Error::other(e));
+    let (out, settings) = (out.into(), settings.into());
+    let failed = |e| out.cannot_write(io::Error::other(e));
     let (scene, origin) = (map.atlas.scene(), origin(map.atlas.scene().bounds()));
     let primitives = primitives(map, origin)?;
     let model = Model::new(map, &settings, &primitives).map_err(failed)?;
@@ -79,7 +78,7 @@ pub fn write_light_map_glb(
     for png in model.images.into_files() {
         file.add_image(png, None);
     }
-    file.write(path, settings.top_node(scene, origin.as_dvec3()), groups)
+    file.write(out, settings.top_node(scene, origin.as_dvec3()), groups)
 }
 
 /// The file's content beside its triangles.

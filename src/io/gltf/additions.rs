@@ -1,14 +1,12 @@
 //! What is added to a glTF document: items of its lists, and numbers behind those of its buffers.
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 
 use super::container::Container;
 use super::document::Document;
 use super::fault::Fault;
 use crate::error::Error;
-use crate::io::{cannot_write, write_file};
+use crate::io::Output;
 
 /// Targets of buffer views: attributes of vertices, and indices of them.
 pub(super) const ARRAY_BUFFER: u32 = 34962;
@@ -66,13 +64,13 @@ impl Additions {
     /// [`crate::ErrorKind::File`] when the file cannot be written.
     pub fn write(
         self,
-        path: &Path,
+        out: Output<'_>,
         container: &Container<'_>,
         document: &Document,
     ) -> Result<(), Error> {
         let file = container.with(self.json, &self.binary, document);
-        let file = file.map_err(|e| cannot_write(path, e))?;
-        write_file(path, |out| std::io::Write::write_all(out, &file))
+        let file = file.map_err(|e| out.cannot_write(e))?;
+        out.write_bytes(&file)
     }
 }
 

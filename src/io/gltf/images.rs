@@ -250,7 +250,10 @@ fn scaled_srgb(byte: u8, share: f64) -> u8 {
         return byte;
     }
     let light = share * crate::scene::texture::linear_of_srgb(byte);
-    let code =
-        if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    let code = if light <= 0.0031308 {
+        12.92 * light
+    } else {
+        1.055 * libm::pow(light, 1.0 / 2.4) - 0.055
+    };
     (255.0 * code).round() as u8
 }

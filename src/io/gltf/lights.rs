@@ -158,7 +158,7 @@ fn spot(inner: f64, outer: f64) -> Result<IntensityDistribution, Error> {
     }
     for k in 0..=STEPS {
         let angle = inner + f64::from(k) / f64::from(STEPS) * (outer - inner);
-        let share = (angle.cos() - outer.cos()) / (inner.cos() - outer.cos());
+        let share = (libm::cos(angle) - libm::cos(outer)) / (libm::cos(inner) - libm::cos(outer));
         angles.push(angle.to_degrees());
         values.push(share.clamp(0.0, 1.0).powi(2));
     }
@@ -181,6 +181,6 @@ fn are_standard(lamps: &[&Lamp<'_>]) -> bool {
 
 /// Whether `value` has at most two digits, up to the rounding of 32-bit floats.
 fn is_round(value: f64) -> bool {
-    let digits = value / 10f64.powf(value.log10().floor() - 1.0);
+    let digits = value / libm::pow(10f64, libm::log10(value).floor() - 1.0);
     (digits - digits.round()).abs() < 1e-5 * digits
 }

@@ -7,8 +7,6 @@
 //!
 //! A mesh of several nodes has one copy for each whose light differs.
 
-use std::path::Path;
-
 use glam::{DAffine3, DMat3, DVec3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use serde_json::{Value, json};
@@ -21,13 +19,14 @@ use super::rewritten::{Source, rewritten};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::io::glb::GlbSettings;
+use crate::io::{Input, Output};
 use crate::scene::Rgb;
 
 /// Cosine below which two normals at one point are of different surfaces: 20°, half of
 /// [`Mesh::CREASE_DEGREES`](crate::Mesh::CREASE_DEGREES).
 const SAME_SURFACE: f64 = 0.94;
 
-/// Writes the glTF file `source` again to `path`, binary or JSON as it is, with the `light` of a
+/// Writes the glTF file `source` again to `out`, binary or JSON as it is, with the `light` of a
 /// bake of it: a primitive gets `_IRRADIANCE` (W/m² per channel, linear, 32-bit floats) and, where
 /// it has no colours, `COLOR_0`: irradiance times reflectance 1 through the tone curve, within
 /// [0, 1], linear. Vertices keep their number and order, and all else in the document and its
@@ -41,14 +40,14 @@ const SAME_SURFACE: f64 = 0.94;
 /// # Errors
 /// [`crate::ErrorKind::File`] when a file cannot be read or written, [`crate::ErrorKind::Scene`]
 /// for a source that is no glTF file.
-pub fn write_lit_gltf(
-    path: impl AsRef<Path>,
-    source: impl AsRef<Path>,
+pub fn write_lit_gltf<'i, 'o>(
+    out: impl Into<Output<'o>>,
+    source: impl Into<Input<'i>>,
     light: &GatheredMesh,
     scene: Option<&str>,
     settings: impl Into<GlbSettings>,
 ) -> Result<LitVertices, Error> {
-    rewritten(path.as_ref(), source.as_ref(), scene, |source, new| {
+    rewritten(out.into(), &source.into(), scene, |source, new| {
         let mut writer = Writer {
             source: &source,
             light: LightOfGroups::new(light),

@@ -5,8 +5,6 @@
 //!   vertex of the file   ── one for each place in the map ── attributes as they are, TEXCOORD_n
 //! ```
 
-use std::path::Path;
-
 use glam::{DVec2, DVec3};
 use image::ExtendedColorType;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -21,8 +19,8 @@ use super::fault::Fault;
 use super::geometry::{Group, bits, check_number, triangles_of};
 use super::rewritten::{Source, rewritten};
 use crate::error::Error;
-use crate::io::cannot_write;
 use crate::io::glb::{GlbSettings, png};
+use crate::io::{Input, Output};
 use crate::light_map::{LightMap, MapPage};
 use crate::scene::{Rgb, luminance};
 
@@ -42,7 +40,7 @@ pub enum MapBinding {
     Occlusion,
 }
 
-/// Writes the glTF file `source` again to `path`, binary or JSON as it is, with a set of texture
+/// Writes the glTF file `source` again to `out`, binary or JSON as it is, with a set of texture
 /// coordinates behind those that primitives have, those of the light `map` of a bake of it. A mesh
 /// of several nodes has one copy for each. Vertices are those of the file, once for each place that
 /// they have in the map; attributes and morph targets keep their types, and all else in the
@@ -53,16 +51,15 @@ pub enum MapBinding {
 /// # Errors
 /// [`crate::ErrorKind::File`] when a file cannot be read or written, [`crate::ErrorKind::Scene`]
 /// for a source that is no glTF file.
-pub fn write_mapped_gltf(
-    path: impl AsRef<Path>,
-    source: impl AsRef<Path>,
+pub fn write_mapped_gltf<'i, 'o>(
+    out: impl Into<Output<'o>>,
+    source: impl Into<Input<'i>>,
     map: &LightMap,
     scene: Option<&str>,
     (binding, files): (MapBinding, &[String]),
     settings: impl Into<GlbSettings>,
 ) -> Result<usize, Error> {
-    let path = path.as_ref();
-    rewritten(path, source.as_ref(), scene, |source, new| {
+    rewritten(out.into(), &source.into(), scene, |source, new| {
         let mut writer = Writer {
             source: &source,
             places: places(map),
@@ -75,7 +72,10 @@ pub fn write_mapped_gltf(
             new,
         };
         let textures = writer.add_textures(&settings.into());
-        textures.map_err(|e| cannot_write(path, std::io::Error::other(e)))?;
+        textures.map_err(|e| {
+            let found = format!("the light map cannot be encoded as PNG: {e}");
+            source.error(Fault::new(found, "make a smaller map"))
+        })?;
         let mut instances = 0;
         for (number, group) in (0u32..).zip(source.groups) {
             if group.is_instance {

@@ -372,7 +372,7 @@ impl MaterialReader<'_, '_> {
             let colour = volume.attenuation_color.map_or(Rgb::ONE, Rgb::from_array);
             let lengths = volume.attenuation_distance.map_or(0.0, |d| volume.thickness_factor / d);
             let lengths = if lengths.is_finite() { lengths.max(0.0) } else { 0.0 };
-            colour.clamp(Rgb::ZERO, Rgb::ONE).powf(lengths)
+            colour.clamp(Rgb::ZERO, Rgb::ONE).map(|share| libm::pow(share, lengths))
         });
         let transmittance = (passed.min(1.0) * base * inside).clamp(Rgb::ZERO, Rgb::ONE);
         let refractive_index = index.clamp(1.0, Specular::MAX_REFRACTIVE_INDEX);

@@ -40,7 +40,7 @@ impl CutTriangle {
     /// points on a side exactly on it.
     fn stretch(&self) -> f64 {
         let [a, b, c] = self.corners;
-        (b.distance(a) / c.distance(a)).log2().round().exp2()
+        libm::exp2(libm::log2(b.distance(a) / c.distance(a)).round())
     }
 
     /// The triangulation of the cuts by stretched weights.

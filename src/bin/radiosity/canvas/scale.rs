@@ -50,7 +50,7 @@ impl Scale {
     /// From 1, 2 or 5 times a power of ten, `low` or below, to one that is `high` or above; both
     /// are above 0.
     pub fn logarithmic(low: f64, high: f64) -> Scale {
-        let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
+        let powers = libm::log10(low).floor() as i32..=libm::log10(high).ceil() as i32;
         let all = powers.flat_map(|p| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(p)));
         let all: Vec<f64> = all.collect();
         let first = all.partition_point(|v| *v <= low).max(1) - 1;
@@ -74,7 +74,7 @@ impl Scale {
     /// Where a value is on the scale, from 0 at its low end to 1 at its high one.
     pub fn share(&self, value: f64) -> f64 {
         let share = match self.is_logarithmic {
-            true => (value.max(self.low) / self.low).ln() / (self.high / self.low).ln(),
+            true => libm::log(value.max(self.low) / self.low) / libm::log(self.high / self.low),
             false => (value - self.low) / (self.high - self.low),
         };
         share.clamp(0.0, 1.0)
@@ -92,14 +92,14 @@ impl Scale {
 
 /// The next of 1, 2 and 5 times powers of ten that is no less than `step`.
 fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
+    let power = libm::pow(10f64, libm::log10(step).floor());
     let all = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power);
     all.into_iter().find(|round| *round >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 
 /// A multiple of `step` with the digits that it takes.
 fn text(value: f64, step: f64) -> String {
-    let digits = (-(step * (1.0 + 1e-9)).log10().floor()).clamp(0.0, 12.0) as usize;
+    let digits = (-libm::log10(step * (1.0 + 1e-9)).floor()).clamp(0.0, 12.0) as usize;
     let value = if value.abs() < step / 2.0 { 0.0 } else { value };
     format!("{value:.digits$}")
 }

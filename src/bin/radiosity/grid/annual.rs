@@ -18,7 +18,7 @@ use super::{Options, Placed};
 use crate::args::{self, Stop};
 use crate::canvas::scale::Scale;
 use crate::measured_sky::DEW_POINT;
-use crate::sun::{Compass, Site};
+use crate::sun::{Compass, Site, angle_between};
 use crate::{interrupt, progress};
 
 /// Share of hours with the target from which a point counts in sDA, and hours of sun above which it
@@ -93,7 +93,7 @@ fn hour(
     let light = SolarIrradiance {
         direct_normal: record.direct_normal,
         diffuse_horizontal: record.diffuse_horizontal,
-        sun_zenith: compass.up.angle_between(towards_sun),
+        sun_zenith: angle_between(compass.up, towards_sun),
         extraterrestrial: SolarIrradiance::extraterrestrial_on(date.ordinal()),
     };
     let dew_point = dew_point.unwrap_or(DEW_POINT);

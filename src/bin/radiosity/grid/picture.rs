@@ -74,7 +74,7 @@ impl Picture<'_> {
 
 /// A value with three digits, or all before the point.
 pub fn three_digits(value: f64) -> String {
-    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let digits = (2.0 - libm::log10(value.abs()).floor()).clamp(0.0, 12.0) as usize;
     if value == 0.0 { "0".into() } else { format!("{value:.digits$}") }
 }
 

@@ -133,7 +133,7 @@ fn short(value: f64) -> String {
     if value <= 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let digits = (1 - value.log10().floor() as i32).max(0) as usize;
+    let digits = (1 - libm::log10(value).floor() as i32).max(0) as usize;
     let text = format!("{value:.digits$}");
     match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').into(),
