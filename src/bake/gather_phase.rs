@@ -67,7 +67,7 @@ pub(super) struct GatherPhase<'a> {
 
 /// A gathered mesh whose error was estimated.
 struct Estimated {
-    light: GatheredMesh,
+    light: Arc<GatheredMesh>,
     error: EstimatedError,
     /// Whether the callback stopped the bake.
     cancelled: bool,
@@ -137,6 +137,9 @@ impl<'a> GatherPhase<'a> {
         loop {
             let stop = self.gather(step, reporter)?;
             let mut estimated = self.estimate(stop, reporter, clock)?;
+            let (light, estimate) = (estimated.light.clone(), Some(estimated.error.whole));
+            let stops = reporter.report(BakeProgress::Light { light, estimate });
+            estimated.cancelled |= stops.is_break();
             // A round is idle if it raises the number of gathers by less than 1 %; two idle rounds
             // are the last, as are MAX_ROUNDS of any kind.
             let gathers = estimated.light.gather_count;
@@ -370,7 +373,7 @@ impl<'a> GatherPhase<'a> {
         light.stop = stop;
         clock.timings.estimate += clock.lap();
         cancelled |= reporter.report(BakeProgress::Estimated(error.whole)).is_break();
-        Ok(Estimated { light, error, cancelled })
+        Ok(Estimated { light: Arc::new(light), error, cancelled })
     }
 
     /// Validates the estimate by paths; where the bake was stopped, by few of them.
@@ -395,7 +398,7 @@ impl<'a> GatherPhase<'a> {
                     // As other vertices have it, of an error that is the same share everywhere.
                     let of_vertex = |b: &Rgb| 2.0 * error.whole.total * b.length();
                     error.vertices = light.surface.radiosity.iter().map(of_vertex).collect();
-                    best = Estimated { light, error, ..best };
+                    best = Estimated { light: Arc::new(light), error, ..best };
                 }
             }
             clock.timings.estimate += clock.lap();
@@ -508,7 +511,8 @@ impl<'a> GatherPhase<'a> {
     }
 
     fn into_result(self, estimated: Estimated, outcome: Outcome) -> BakedLight {
-        let Estimated { mut light, error, .. } = estimated;
+        let Estimated { light, error, .. } = estimated;
+        let mut light = Arc::unwrap_or_clone(light);
         let EstimatedError { whole: estimate, groups, vertices, .. } = error;
         light.surface.error = vertices;
         let (solve, measure) = (self.solve, self.measure);

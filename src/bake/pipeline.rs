@@ -106,8 +106,14 @@ impl<'p> Pipeline<'p> {
     fn finish(self, shot: ShotLight) -> Result<BakeResult, Error> {
         let Pipeline { settings, backend, target, mut reporter, mut clock } = self;
         let by_elements = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
+        let by_elements = Arc::new(by_elements);
         let baked = match &settings.gather {
             Some(gather) if shot.solution.stop != StopReason::Cancelled => {
+                if target.is_none_or(|target| target.within.is_none()) {
+                    // A stop is heard at the next report.
+                    let light = BakeProgress::Light { light: by_elements.clone(), estimate: None };
+                    let _ = reporter.report(light);
+                }
                 let scene = &shot.mesh.shared_scene();
                 let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
                 let phase =
@@ -119,7 +125,7 @@ impl<'p> Pipeline<'p> {
                 &shot,
                 settings,
                 target,
-                by_elements,
+                Arc::unwrap_or_clone(by_elements),
                 backend,
                 &mut reporter,
                 &mut clock,

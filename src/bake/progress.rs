@@ -1,11 +1,12 @@
 //! Progress of a bake, and wall time by stage.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use crate::bake::error_estimate::ErrorEstimate;
 use crate::bake::fallback::ResilientBackend;
 use crate::error::Error;
-use crate::gather::Progress as GatherProgress;
+use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::progress::{Instant, Timings, lap};
 use crate::solver::Progress;
 
@@ -29,6 +30,14 @@ pub enum BakeProgress {
     },
     /// The error was estimated.
     Estimated(ErrorEstimate),
+    /// Better light than before, complete: to be looked at while the bake goes on. First what was
+    /// shot on elements, then what vertices have gathered, each time the error is estimated.
+    Light {
+        /// Radiosity at vertices; their errors are not known yet.
+        light: Arc<GatheredMesh>,
+        /// Its estimated error; none of what was shot.
+        estimate: Option<ErrorEstimate>,
+    },
     /// The graphics device failed. Nothing is lost: rays on the CPU go on from here, more slowly;
     /// or, if the callback stops the bake, what was reached is returned.
     DeviceFailed(Error),
