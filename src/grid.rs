@@ -148,8 +148,8 @@ impl MeasuringGrid {
         Ok(Some(MeasuredGrid { grid: self.clone(), values, mean_error }))
     }
 
-    /// Measures all `grids` until gathering alone leaves less than a quarter of the share `error` of
-    /// their values, so that [`MeasuredGrid::correct`] has most of it: `gatherers` make one of a
+    /// Measures all `grids` until gathering alone leaves less than a quarter of the share `error`
+    /// of their values, so that [`MeasuredGrid::correct`] has most of it: `gatherers` make one of a
     /// noise, such as [`Backend::gather_to_noise`](crate::Backend::gather_to_noise). `progress` and
     /// `None` are those of [`MeasuringGrid::measure`].
     ///

@@ -298,7 +298,8 @@ impl Mesh {
         &self.scene
     }
 
-    pub(crate) fn shared_scene(&self) -> Arc<Scene> {
+    /// The same, to be shared.
+    pub fn shared_scene(&self) -> Arc<Scene> {
         self.scene.clone()
     }
 

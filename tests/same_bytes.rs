@@ -5,8 +5,9 @@
 //! targets by an emulator:
 //!
 //! ```sh
-//! export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
-//! export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
+//! target=CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU
+//! export ${target}_LINKER=aarch64-linux-gnu-gcc
+//! export ${target}_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
 //! cargo test --release --target aarch64-unknown-linux-gnu --no-default-features \
 //!     --features glb,textures --test same_bytes
 //! ```

@@ -158,7 +158,7 @@ impl PyBake {
 
     #[getter]
     fn scene(&self) -> PyScene {
-        PyScene(Arc::new(self.baked.light.mesh.scene().clone()))
+        PyScene(self.baked.light.mesh.shared_scene())
     }
 
     /// What was measured of the bake.

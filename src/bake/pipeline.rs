@@ -103,17 +103,19 @@ impl<'p> Pipeline<'p> {
     }
 
     /// Vertices gather what was `shot`.
-    fn finish(self, shot: ShotLight) -> Result<BakeResult, Error> {
+    fn finish(self, mut shot: ShotLight) -> Result<BakeResult, Error> {
         let Pipeline { settings, backend, target, mut reporter, mut clock } = self;
         let by_elements = GatheredMesh::from_elements(&shot.mesh, &shot.solution.radiosity)?;
         let by_elements = Arc::new(by_elements);
+        // Within a time nothing is shot.
+        if settings.gather.is_some() && target.is_none_or(|target| target.within.is_none()) {
+            let light = BakeProgress::Light { light: by_elements.clone(), estimate: None };
+            if reporter.report(light).is_break() {
+                shot.solution.stop = StopReason::Cancelled;
+            }
+        }
         let baked = match &settings.gather {
             Some(gather) if shot.solution.stop != StopReason::Cancelled => {
-                if target.is_none_or(|target| target.within.is_none()) {
-                    // A stop is heard at the next report.
-                    let light = BakeProgress::Light { light: by_elements.clone(), estimate: None };
-                    let _ = reporter.report(light);
-                }
                 let scene = &shot.mesh.shared_scene();
                 let mesh = first_gather_mesh(&settings.solve, gather, scene)?;
                 let phase =

@@ -30,8 +30,9 @@ pub enum BakeProgress {
     },
     /// The error was estimated.
     Estimated(ErrorEstimate),
-    /// Better light than before, complete: to be looked at while the bake goes on. First what was
-    /// shot on elements, then what vertices have gathered, each time the error is estimated.
+    /// Better light than before, complete: to be looked at while the bake goes on. First what is
+    /// shot on elements, after a quarter of a second, half a second, and so on; then what vertices
+    /// have gathered, each time the error is estimated.
     Light {
         /// Radiosity at vertices; their errors are not known yet.
         light: Arc<GatheredMesh>,

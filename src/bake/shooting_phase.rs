@@ -8,7 +8,6 @@
 //! ```
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,8 +30,12 @@ use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
 use crate::progress::{Instant, StopReason};
 use crate::scene::Scene;
-use crate::solver::{Progress, ReceivedLight, Solution, Solver};
+use crate::solver::{Progress, ReceivedLight, Solution};
 use crate::verify::octaves_of;
+
+/// Time of shooting until its light is shown first. Plain choice: a picture within half a second,
+/// and none of scenes that take no longer.
+const FIRST_LIGHT: Duration = Duration::from_millis(250);
 
 /// What the first phase leaves to the second.
 pub(super) struct ShotLight {
@@ -73,11 +76,9 @@ pub(super) fn shoot(
     let rows = backend.rows(&mesh, settings)?;
     let mut rows = ProximityCorrection::new(rows, &mesh, settings.near_reach);
     clock.timings.mesh = clock.lap();
-    let mut progress = |p: &Progress| reporter.report(BakeProgress::Shooting(*p));
-    let nothing_shot = Progress::NOTHING_SHOT;
-    let mut proceed = || progress(&nothing_shot);
+    let mut proceed = || reporter.report(BakeProgress::Shooting(Progress::NOTHING_SHOT));
     let received = received(&mesh, &settings.gathered_materials, backend, &mut proceed)?;
-    let mut solution = solve(settings, &mesh, &received, &mut rows, &mut progress)?;
+    let mut solution = solve(settings, &mesh, &received, &mut rows, reporter)?;
     if settings.ambient {
         solution.ledger.add_ambient(&mesh, &mut solution.radiosity);
     }
@@ -103,44 +104,33 @@ pub(super) fn shoot(
     })
 }
 
-/// Spreads the light of `mesh`; from a checkpoint on if there is one, and writes one now and then.
+/// Spreads the light of `mesh`, and shows it on the way; from a checkpoint on if there is one, and
+/// writes one now and then.
 fn solve(
     settings: &SolveSettings,
     mesh: &Mesh,
     received: &ReceivedLight,
     rows: &mut dyn FormFactors,
-    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    reporter: &mut Reporter,
 ) -> Result<Solution, Error> {
     let solver = settings.solver_for(mesh);
-    match &settings.checkpoint {
-        Some(path) => solve_with_checkpoints(&solver, path, mesh, received, rows, progress),
-        None => {
-            let mut session = solver.begin_after(mesh, received)?;
-            session.run(rows, progress)?;
-            session.into_solution()
-        }
-    }
-}
-
-fn solve_with_checkpoints(
-    solver: &Solver,
-    path: &Path,
-    mesh: &Mesh,
-    received: &ReceivedLight,
-    rows: &mut dyn FormFactors,
-    progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<Solution, Error> {
-    let mut session = if path.exists() {
-        solver.resume_after(mesh, received, rows, path)?
-    } else {
-        solver.begin_after(mesh, received)?
+    let mut session = match &settings.checkpoint {
+        Some(path) if path.exists() => solver.resume_after(mesh, received, rows, path)?,
+        _ => solver.begin_after(mesh, received)?,
     };
-    let mut saved = Instant::now();
+    let (start, mut saved) = (Instant::now(), Instant::now());
     let mut saving_time = Duration::ZERO;
+    let mut next_light = FIRST_LIGHT;
     loop {
-        let stop = session.advance(rows, &mut *progress)?;
+        let mut progress = |p: &Progress| {
+            let progress = Progress { elapsed: start.elapsed(), ..*p };
+            reporter.report(BakeProgress::Shooting(progress))
+        };
+        let stop = session.advance(rows, &mut progress)?;
         // A tenth of the time at most is for writing.
-        if stop.is_some() || saved.elapsed() >= 10 * saving_time {
+        if let Some(path) = &settings.checkpoint
+            && (stop.is_some() || saved.elapsed() >= 10 * saving_time)
+        {
             let start = Instant::now();
             session.save(path)?;
             saved = Instant::now();
@@ -148,6 +138,15 @@ fn solve_with_checkpoints(
         }
         if stop.is_some() {
             return session.into_solution();
+        }
+        if start.elapsed() >= next_light {
+            let shown = Instant::now();
+            let light = Arc::new(GatheredMesh::from_elements(mesh, &session.light_so_far())?);
+            if reporter.report(BakeProgress::Light { light, estimate: None }).is_break() {
+                return session.into_solution();
+            }
+            // A tenth of the time at most is for showing.
+            next_light = (2 * start.elapsed()).max(start.elapsed() + 10 * shown.elapsed());
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
 use crate::progress::{Instant, StopReason};
+use crate::scene::Rgb;
 
 /// A solve that advances by batches of rows: [`Solver::begin`] creates it.
 ///
@@ -169,6 +170,13 @@ impl<'m> SolveSession<'m> {
     /// Those of [`SolveSession::into_solution`].
     pub fn solution(&self) -> Result<Solution, Error> {
         self.clone().into_solution()
+    }
+
+    /// Radiosity of the elements so far, what is unshot fallen evenly on all, W/m² per channel.
+    pub(crate) fn light_so_far(&self) -> Vec<Rgb> {
+        let mut radiosity = self.state.radiosity();
+        self.state.ledger.add_ambient(self.state.mesh, &mut radiosity);
+        radiosity
     }
 
     /// The energy balance so far; flux held by GMRES is counted as unshot.

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Makes the page, web/dist, and what the package needs, web/pkg. Needs Rust with the target
+# wasm32-unknown-unknown, and Node.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+[ -d node_modules ] || npm ci --silent
+cargo build --locked --release --target wasm32-unknown-unknown -p radiosity-web \
+    --config 'target.wasm32-unknown-unknown.rustflags=["-C", "target-feature=+simd128"]'
+cargo run --locked --release --quiet -p radiosity-web-bindgen -- \
+    ../target/wasm32-unknown-unknown/release/radiosity_web.wasm pkg
+# The features that rustc uses by default, and SIMD.
+npx wasm-opt -O3 --strip-debug --strip-producers --enable-simd --enable-bulk-memory \
+    --enable-bulk-memory-opt --enable-sign-ext --enable-mutable-globals \
+    --enable-nontrapping-float-to-int --enable-reference-types --enable-multivalue \
+    pkg/radiosity_bg.wasm -o pkg/radiosity_bg.wasm
+
+rm -rf dist
+mkdir dist
+npx esbuild page/main.js js/worker.js --bundle --format=esm --minify --target=es2022 --external:node:fs/promises \
+    --outdir=dist --entry-names='[name]' --log-level=warning
+cp pkg/radiosity_bg.wasm dist/radiosity.wasm
+cp page/index.html page/style.css ../scenes/cornell_box.obj ../scenes/cornell_box.mtl dist
+total=$(cd dist && for file in *; do node -e '
+    const { brotliCompressSync } = require("zlib");
+    console.log(brotliCompressSync(require("fs").readFileSync(process.argv[1])).length)' "$file"
+done | paste -sd+ | bc)
+echo "dist: $total bytes compressed (brotli)"
+if [ "$total" -gt 2500000 ]; then echo "more than 2.5 MB" >&2; exit 1; fi
