@@ -29,7 +29,10 @@ export interface Options {
   strict?: boolean;
   /** Hears how far the bake is; answers `false` to stop it with what there is. */
   onProgress?: (progress: Progress) => boolean | void;
-  /** Hears of light as it gets better, complete each time; answers as `onProgress`. */
+  /**
+   * Hears of light as it gets better, complete each time; answers as `onProgress`. The first is of
+   * stage "shape": reflectances, before there is light.
+   */
   onLight?: (light: Arrays & Progress) => boolean | void;
   /** Stops the bake with what there is. */
   signal?: AbortSignal;

@@ -97,10 +97,10 @@ async function start() {
   } catch (failure) {
     if (running !== own) return;
     const kept = last ? " What is shown is the light until then: a picture of it can be saved." : "";
-    const memory = failure.isTrap
-      ? "The bake ended: this browser has no more memory for it, or a defect was met. "
-      : "";
-    say(`${memory}${failure.message}.${kept}`.replace("..", "."));
+    const why = failure.isTrap
+      ? `The bake ended for want of memory, or by a defect (${failure.message})`
+      : failure.message;
+    say(`${why}.${kept}`);
     at("progress").value = 0;
   } finally {
     if (running === own) {

@@ -1,10 +1,12 @@
 //! Calls of the caller's functions while a bake works.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use js_sys::{Date, Function};
-use radiosity::Camera;
 use radiosity::bake::BakeProgress;
+use radiosity::glam::DVec3;
+use radiosity::{Camera, GatheredMesh, Mesh, Rgb, Scene};
 use serde_json::{Value, json};
 use wasm_bindgen::JsValue;
 
@@ -36,18 +38,7 @@ impl Callbacks {
         let share = |done: usize, of: usize| (of > 0).then(|| done as f64 / of as f64);
         match progress {
             BakeProgress::Light { light, estimate } => {
-                let Camera { eye, target, up, vertical_fov } = Camera::framing(light, ASPECT);
-                let camera = json!({
-                    "eye": eye.to_array(),
-                    "target": target.to_array(),
-                    "up": up.to_array(),
-                    "fov": vertical_fov,
-                });
-                let mut state = self.state("light", None, estimate.map(|e| e.total));
-                state["camera"] = camera;
-                let state = JsValue::from(state.to_string());
-                let light = JsValue::from(Light::new(&light.surface));
-                self.answer(self.light.call2(&JsValue::NULL, &light, &state))
+                self.show("light", light, estimate.map(|e| e.total))
             }
             BakeProgress::Estimated(estimate) => {
                 self.error = Some(estimate.total);
@@ -63,6 +54,38 @@ impl Callbacks {
             }
             _ => self.say("baking", None, false),
         }
+    }
+
+    /// Shows the surfaces of a scene before there is light: their reflectance, by which way they
+    /// face.
+    pub fn show_shape(&mut self, scene: &Arc<Scene>) {
+        let Ok(mesh) = Mesh::new(scene.clone(), f64::INFINITY) else { return };
+        let shade = |e: usize| {
+            let node = mesh.element(e);
+            // Plain choice: faces along the axes differ.
+            let facing = mesh.normal(node).dot(DVec3::new(0.36, 0.48, 0.8)).abs();
+            let triangle = scene.triangles()[mesh.triangle(node)];
+            scene.materials()[triangle.material as usize].reflectance * (0.4 + 0.6 * facing)
+        };
+        let shaded: Vec<Rgb> = (0..mesh.element_count()).map(shade).collect();
+        if let Ok(light) = GatheredMesh::from_elements(&mesh, &shaded) {
+            // A stop is heard at the next report.
+            let _ = self.show("shape", &light, None);
+        }
+    }
+
+    /// Calls the function of light, with a camera that frames it.
+    fn show(&mut self, stage: &str, light: &GatheredMesh, error: Option<f64>) -> ControlFlow<()> {
+        let Camera { eye, target, up, vertical_fov } = Camera::framing(light, ASPECT);
+        let mut state = self.state(stage, None, error);
+        state["camera"] = json!({
+            "eye": eye.to_array(),
+            "target": target.to_array(),
+            "up": up.to_array(),
+            "fov": vertical_fov,
+        });
+        let light = JsValue::from(Light::new(&light.surface));
+        self.answer(self.light.call2(&JsValue::NULL, &light, &state.to_string().into()))
     }
 
     /// Calls the function of progress, unless that was a moment ago.

@@ -9,6 +9,8 @@ mod callbacks;
 mod light;
 mod options;
 
+use std::sync::Arc;
+
 use js_sys::Function;
 use radiosity::io::{GlbSettings, Input, ToneCurve, write_lit_gltf};
 use radiosity::{Backend, BakeResult, BakeSettings, Error, solver, write_glb, write_ply};
@@ -85,7 +87,9 @@ pub fn bake(
 ) -> Result<Bake, JsError> {
     let options = Options::parse(options).map_err(js)?;
     let scene = files.with(|file| options.scene(file)).map_err(js)?;
+    let scene = Arc::new(scene);
     let mut callbacks = Callbacks::new(on_progress, on_light);
+    callbacks.show_shape(&scene);
     let baked = options.target().map_err(js)?.bake(scene, &Backend::Cpu, |p| callbacks.hear(p));
     Ok(Bake { files, baked: baked.map_err(js)? })
 }

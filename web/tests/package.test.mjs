@@ -51,8 +51,8 @@ test("light is arrays with a report", async () => {
   assert.ok(light.faces.every((corner) => corner < vertices));
   assert.ok(light.report.reached && light.report.error <= 0.05 && light.report.warnings.length === 0);
   assert.ok(heard.length > 0 && heard.every(({ seconds }) => seconds >= 0));
-  // First what is shot, then what gathers.
-  assert.ok(better.length >= 2 && better[0].error === null && better.at(-1).error > 0);
+  // First shapes, then what is shot, then what gathers.
+  assert.ok(better.length >= 3 && better[0].stage === "shape" && better.at(-1).error > 0);
   assert.ok(better.every(({ positions, camera }) => positions.length > 0 && camera.eye.length === 3));
   const [dark, direct] = [await light.bounces(0), await light.bounces(1)];
   const sum = (array) => array.reduce((a, b) => a + b, 0) / array.length;

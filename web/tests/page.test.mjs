@@ -145,6 +145,25 @@ for (const name of ["chromium", "firefox"]) {
   });
 }
 
+test("memory that ends is said, and the picture is kept", {
+  skip: installed("chromium") ? false : "not installed",
+}, async () => {
+  const server = await serve();
+  // 75 MiB.
+  const args = ["--js-flags=--wasm-max-mem-pages=1200"];
+  const { page, downloads, errors, end } = await open("chromium", server.address, { args });
+  await slide(page, "error", "100");
+  await page.click("#box");
+  assert.match(await status(page, /The bake ended/), /memory.*picture/);
+  assert.ok((await download(page, downloads, "png")).bytes.length > 5000);
+  await slide(page, "error", "20");
+  await page.click("#bake");
+  await status(page, /Cornell box: error/);
+  assert.deepEqual(errors, []);
+  await end();
+  server.end();
+});
+
 test("a browser is installed", () => {
   assert.ok(installed("chromium") || installed("firefox"), "install chromium or firefox-esr");
 });
