@@ -1,8 +1,7 @@
 //! Where files are read.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::{self, BufReader, Cursor, Read, Seek};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::files::{self, FileSource};
@@ -36,9 +35,11 @@ struct Memory<'a> {
 }
 
 /// Bytes that can be read in any order.
-pub(super) trait ReadSeek: Read + Seek {}
+#[cfg(any(feature = "glb", feature = "npz"))]
+pub(super) trait ReadSeek: io::Read + io::Seek {}
 
-impl<R: Read + Seek> ReadSeek for R {}
+#[cfg(any(feature = "glb", feature = "npz"))]
+impl<R: io::Read + io::Seek> ReadSeek for R {}
 
 impl<'a> Input<'a> {
     /// This `content`, under a `name` for messages, whose ending can say the format.
@@ -75,13 +76,15 @@ impl<'a> Input<'a> {
     ///
     /// # Errors
     /// [`ErrorKind::File`] when it cannot be read.
+    #[cfg(any(feature = "glb", feature = "npz"))]
     pub(super) fn open(&self, remedy: &str) -> Result<Box<dyn ReadSeek + 'a>, Error> {
         match self.memory {
             None => {
-                let file = File::open(&self.path).map_err(|e| self.cannot_read(e, remedy))?;
-                Ok(Box::new(BufReader::new(file)))
+                let file = std::fs::File::open(&self.path);
+                let file = file.map_err(|e| self.cannot_read(e, remedy))?;
+                Ok(Box::new(io::BufReader::new(file)))
             }
-            Some(Memory { content, .. }) => Ok(Box::new(Cursor::new(content))),
+            Some(Memory { content, .. }) => Ok(Box::new(io::Cursor::new(content))),
         }
     }
 
