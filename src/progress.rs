@@ -51,14 +51,21 @@ const BATCH_DURATION: Duration = Duration::from_millis(250);
 /// ends, which follow the clock.
 #[derive(Clone)]
 pub(crate) struct BatchSizer {
-    /// Items in the next batch.
+    /// Items in the next batch, and in any but the last at least.
     size: usize,
+    least: usize,
 }
 
 impl BatchSizer {
     /// The first batch has `first` items.
     pub fn new(first: usize) -> BatchSizer {
-        BatchSizer { size: first }
+        BatchSizer { size: first, least: 1 }
+    }
+
+    /// As many items at least, all but in the last batch: those that are done at once, each by one
+    /// thread.
+    pub fn at_least(self, least: usize) -> BatchSizer {
+        BatchSizer { size: self.size.max(least), least }
     }
 
     /// Takes the next batch off the front of `remaining` and returns the result of `work` on it.
@@ -75,7 +82,7 @@ impl BatchSizer {
         let result = work(batch);
         let duration = start.elapsed();
         if duration > BATCH_DURATION {
-            self.size = (self.size / 2).max(1);
+            self.size = (self.size / 2).max(self.least);
         } else if duration < BATCH_DURATION / 3 && batch.len() == self.size {
             self.size *= 2;
         }

@@ -31,7 +31,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("grid", "error gather geometry path_correction scene visibility"),
     ("daylight", "error gather light progress sampling scene visibility"),
     ("probe", "error gather path_correction progress scene visibility"),
-    ("view_factor", "error form_factor geometry ranks sampling scene visibility"),
+    ("view_factor", "error form_factor geometry progress ranks sampling scene visibility"),
     ("heat", "error geometry linear view_factor"),
     (
         "backend",

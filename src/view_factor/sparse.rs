@@ -24,10 +24,12 @@ use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
 use super::scene_polygons::ScenePolygons;
+use crate::progress::BatchSizer;
 use crate::ranks::share_out;
 use crate::scene::Scene;
 
-/// Polygons between two progress calls. Plain choice.
+/// Polygons of a process between two progress calls, where several processes take the same batches;
+/// alone they follow the clock. Plain choice.
 const BATCH: usize = 256;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
@@ -85,13 +87,20 @@ pub(super) fn make(
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
     let later = met_either_way(rows);
     let mut done = 2 * count;
-    for batch in wanted.chunks(BATCH * making.ranks.size()) {
-        // The number of pairs of polygons varies by a factor of a thousand.
-        let pieces = |&s: &u32| later[s as usize].chunks(64).map(move |c| (s, c));
-        let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
-        let of_piece = |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
-        let exchanges = share_out(&pieces, making.ranks, of_piece);
-        let mut exchanges = pieces.iter().map(|(s, _)| *s).zip(exchanges).peekable();
+    let (mut remaining, processes) = (wanted, making.ranks.size());
+    let mut batches = BatchSizer::new(BATCH / 8);
+    while !remaining.is_empty() {
+        let (batch, exchanges) = next_batch(&mut batches, &mut remaining, processes, |batch| {
+            // The number of pairs of polygons varies by a factor of a thousand.
+            let pieces = |&s: &u32| later[s as usize].chunks(64).map(move |c| (s, c));
+            let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
+            let of_piece =
+                |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
+            let of_pieces = share_out(&pieces, making.ranks, of_piece);
+            let polygons: Vec<u32> = pieces.iter().map(|(s, _)| *s).collect();
+            (batch, polygons.into_iter().zip(of_pieces))
+        });
+        let mut exchanges = exchanges.peekable();
         for &s in batch {
             let mut row =
                 PolygonRow { fronts: vec![], back: to_backs(fronts, &rows[s as usize], s) };
@@ -116,12 +125,32 @@ fn in_batches<R: Send + Serialize + DeserializeOwned>(
     work: impl Fn(&u32) -> R + Sync,
 ) -> Option<Vec<R>> {
     let mut results = Vec::with_capacity(items.len());
-    for batch in items.chunks(BATCH * making.ranks.size()) {
-        results.extend(share_out(batch, making.ranks, &work));
+    let (mut remaining, processes) = (items, making.ranks.size());
+    // A polygon is done by one thread.
+    let mut batches = BatchSizer::new(BATCH / 8).at_least(2 * rayon::current_num_threads());
+    while !remaining.is_empty() {
+        results.extend(next_batch(&mut batches, &mut remaining, processes, |batch| {
+            share_out(batch, making.ranks, &work)
+        }));
         let count = items.len();
         making.tell_all((told.start + results.len()) * count / told.end, count)?;
     }
     Some(results)
+}
+
+/// The result of `work` on the next of the `remaining` polygons, of this number of processes.
+fn next_batch<'t, R>(
+    batches: &mut BatchSizer,
+    remaining: &mut &'t [u32],
+    processes: usize,
+    work: impl FnOnce(&'t [u32]) -> R,
+) -> R {
+    if processes == 1 {
+        return batches.next(remaining, work);
+    }
+    let (batch, rest) = remaining.split_at(remaining.len().min(BATCH * processes));
+    *remaining = rest;
+    work(batch)
 }
 
 /// Sums exchanges with polygons, in ascending order of their groups, to one exchange per group.
