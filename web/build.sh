@@ -21,9 +21,9 @@ npx esbuild page/main.js js/worker.js --bundle --format=esm --minify --target=es
     --outdir=dist --entry-names='[name]' --log-level=warning
 cp pkg/radiosity_bg.wasm dist/radiosity.wasm
 cp page/index.html page/style.css ../scenes/cornell_box.obj ../scenes/cornell_box.mtl dist
-total=$(cd dist && for file in *; do node -e '
-    const { brotliCompressSync } = require("zlib");
-    console.log(brotliCompressSync(require("fs").readFileSync(process.argv[1])).length)' "$file"
-done | paste -sd+ | bc)
-echo "dist: $total bytes compressed (brotli)"
-if [ "$total" -gt 2500000 ]; then echo "more than 2.5 MB" >&2; exit 1; fi
+node -e '
+    const fs = require("fs"), { brotliCompressSync } = require("zlib");
+    const size = (file) => brotliCompressSync(fs.readFileSync(`dist/${file}`)).length;
+    const total = fs.readdirSync("dist").map(size).reduce((a, b) => a + b);
+    console.log(`dist: ${total} bytes compressed (brotli)`);
+    if (total > 2.5e6) throw "more than 2.5 MB";'
