@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use radiosity::backend::AdapterKind;
 use radiosity::bake::{BakeProgress, Obstacle, Outcome};
+use radiosity::camera::RadianceImage;
 use radiosity::glam::DVec3;
 use radiosity::grid::{GridPlane, GridSettings, MeasuredGrid, MeasuringGrid};
 use radiosity::io::{GlbSettings, ToneCurve, write_lit_gltf};
@@ -24,7 +25,7 @@ use radiosity::{
 
 use crate::arrays::{check_columns, image, rows, vectors, view1, view2};
 use crate::scene::PyScene;
-use crate::work::{Done, Reporter, raise, run, run_whole};
+use crate::work::{Done, Reporter, raise, run, run_at_once, run_whole};
 
 /// A device: `cpu`, `auto` for graphics hardware where there is any, or a part of the name of an
 /// adapter.
@@ -196,7 +197,7 @@ impl PyBake {
     /// Writes a file in the format of its ending; a GLB as the file `source` with light, if given.
     #[pyo3(signature = (path, source=None))]
     fn save(&self, py: Python<'_>, path: PathBuf, source: Option<PathBuf>) -> PyResult<()> {
-        py.detach(|| save(&self.baked, self.surface(), &path, source)).map_err(raise)
+        run_at_once(py, || save(&self.baked, self.surface(), &path, source))
     }
 
     /// A picture: radiance (rows, columns, 3), W/(m2 sr). A camera is its eye, target, up axis and
@@ -210,7 +211,7 @@ impl PyBake {
         threads: usize,
     ) -> PyResult<PyImage> {
         let [width, height] = size;
-        let Done { result, .. } = run(py, threads, None, |_| {
+        let image = run_whole(py, threads, None, |_| {
             let light = &self.baked.light;
             let camera = match camera {
                 None => Camera::framing(light, f64::from(width) / f64::from(height)),
@@ -219,9 +220,9 @@ impl PyBake {
                     Camera { eye, target, up, vertical_fov }
                 }
             };
-            camera.image(&light.surface, width, height, 4)
+            camera.image(&light.surface, width, height, 4).map(Some)
         })?;
-        Ok(PyImage { size: [result.width, result.height], pixels: result.pixels })
+        Ok(PyImage(image))
     }
 
     /// Measures grids in the light.
@@ -256,8 +257,8 @@ impl PyBake {
                 (None, None) => MeasuringGrid::above_floors(scene, scene.up(), height, &settings)?,
             })
         };
-        let grids = grids().map_err(raise)?;
         let measured = run_whole(py, threads, progress, |reporter| {
+            let grids = grids()?;
             let mut gatherers = |noise| self.backend.gather_to_noise(light, noise);
             let points = |done, of| reporter.count("points", done, of);
             let measured = MeasuringGrid::measure_to(&grids, light, &mut gatherers, error, points)?;
@@ -379,30 +380,26 @@ fn save(
     }
 }
 
-/// Pixels, or texels.
+/// A picture of radiance.
 #[pyclass(frozen, name = "Image", module = "radiosity._radiosity")]
 #[derive(Debug)]
-pub struct PyImage {
-    size: [u32; 2],
-    pixels: Vec<Rgb>,
-}
+pub struct PyImage(RadianceImage);
 
 #[pymethods]
 impl PyImage {
     #[getter]
     fn pixels<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        image(slf.as_any(), &slf.get().pixels, slf.get().size)
+        let RadianceImage { width, height, pixels, .. } = &slf.get().0;
+        image(slf.as_any(), pixels, [*width, *height])
     }
 
     /// The same in colours of sRGB, (rows, columns, 3) of 8 bits.
     fn colours<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let tone = ToneCurve::fit(
-            &self.pixels.iter().map(|c| *c * std::f64::consts::PI).collect::<Vec<_>>(),
-        );
-        let tone = ToneCurve::with_exposure(tone.exposure() * std::f64::consts::PI);
-        let bytes: Vec<u8> = self.pixels.iter().flat_map(|&c| tone.display(c)).collect();
-        let [width, height] = self.size.map(|side| side as usize);
-        PyArray1::from_vec(py, bytes).reshape([height, width, 3])
+        let RadianceImage { width, height, pixels, .. } = &self.0;
+        let tone = ToneCurve::fit_image(&self.0);
+        let bytes: Vec<u8> = pixels.iter().flat_map(|&c| tone.display(c)).collect();
+        let shape = [*height as usize, *width as usize, 3];
+        PyArray1::from_vec(py, bytes).reshape(shape)
     }
 }
 

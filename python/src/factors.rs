@@ -12,7 +12,7 @@ use radiosity::view_factor::{Factor, Missing};
 
 use crate::arrays::{check_columns, numbers};
 use crate::scene::PyScene;
-use crate::work::{raise, run_whole};
+use crate::work::{raise, run_at_once, run_whole};
 
 /// A matrix of view factors.
 #[pyclass(frozen, name = "Factors", module = "radiosity._radiosity")]
@@ -116,9 +116,9 @@ impl PyFactors {
     }
 
     /// The same with closure and reciprocity enforced, and the root mean square of the change.
-    fn enforced(&self) -> (PyFactors, f64) {
-        let (enforced, report) = self.0.enforced();
-        (PyFactors(enforced), report.rms_change)
+    fn enforced(&self, py: Python<'_>) -> PyResult<(PyFactors, f64)> {
+        let (enforced, report) = run_at_once(py, || Ok(self.0.enforced()))?;
+        Ok((PyFactors(enforced), report.rms_change))
     }
 
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {

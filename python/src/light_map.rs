@@ -14,7 +14,7 @@ use radiosity::{Error, ErrorKind};
 use crate::arrays::image;
 use crate::bake::PyBake;
 use crate::scene::PyScene;
-use crate::work::{raise, run_whole};
+use crate::work::{run_at_once, run_whole};
 
 /// Texels of irradiance.
 #[pyclass(frozen, name = "LightMap", module = "radiosity._radiosity")]
@@ -50,7 +50,7 @@ pub fn atlas(
         _ => Coordinates::Auto,
     };
     let scene = scene.0.clone();
-    run_whole(py, 0, None, |_| Atlas::with_settings(scene, &settings).map(Some)).map(PyAtlas)
+    run_at_once(py, || Atlas::with_settings(scene, &settings)).map(PyAtlas)
 }
 
 #[pymethods]
@@ -140,7 +140,7 @@ impl PyLightMap {
         binding: &str,
         map_file: Option<String>,
     ) -> PyResult<()> {
-        py.detach(|| self.write(&path, source, binding, map_file)).map_err(raise)
+        run_at_once(py, || self.write(&path, source, binding, map_file))
     }
 }
 

@@ -14,7 +14,7 @@ use solar_positioning::time::JulianDate;
 use solar_positioning::{Location, SolarPositions, delta_t};
 
 use crate::arrays::{check_columns, numbers, rows, vectors, view2};
-use crate::work::{Done, raise, run};
+use crate::work::{raise, run_at_once};
 
 /// A scene; it does not change.
 #[pyclass(frozen, name = "Scene", module = "radiosity._radiosity")]
@@ -100,7 +100,7 @@ impl PyScene {
         }
         // Another takes its place: this one keeps the default from being chosen.
         settings.sky = has_sky.then(|| Rgb::ONE.into());
-        let Done { result, raised } = run(py, 0, None, |_| match &content {
+        let scene = run_at_once(py, || match &content {
             None => settings.load(&path),
             Some((content, files)) => {
                 let files: Vec<(&str, &[u8])> =
@@ -108,10 +108,7 @@ impl PyScene {
                 settings.load(Input::bytes(&path, content).with_files(&files))
             }
         })?;
-        match raised {
-            Some(raised) => Err(raised),
-            None => Ok(PyScene(Arc::new(result))),
-        }
+        Ok(PyScene(Arc::new(scene)))
     }
 
     /// The same scene under another sky.
@@ -244,9 +241,13 @@ impl PySky {
             None => Sky::default(),
             Some(distribution) => {
                 let relative = spread(distribution).map_err(raise)?.irradiance(up).x;
-                // One whose zenith is black has no radiance relative to it; then as if uniform.
-                let zenith = Rgb::splat(if relative > 0.0 { diffuse / relative } else { 0.0 });
-                Sky::new(distribution, zenith, up, sun).map_err(raise)?
+                // One whose zenith is black has no radiance relative to it; then it is even above
+                // the horizon, as CIE's number 5, in the program too.
+                let (distribution, zenith) = match SkyDistribution::cie(5) {
+                    Some(even) if relative <= 0.0 => (even, diffuse / std::f64::consts::PI),
+                    _ => (distribution, diffuse / relative),
+                };
+                Sky::new(distribution, Rgb::splat(zenith), up, sun).map_err(raise)?
             }
         };
         let irradiance = Rgb::splat(direct_normal * direct);

@@ -153,6 +153,15 @@ pub fn run_whole<T: Send>(
     }
 }
 
+/// As [`run_whole`], for work that is done in a moment: what it does in parallel is on threads of
+/// its own, too.
+pub fn run_at_once<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    run_whole(py, 0, None, |_| work().map(Some))
+}
+
 pyo3::create_exception!(
     radiosity,
     Stopped,

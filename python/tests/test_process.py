@@ -106,11 +106,12 @@ def test_two_threads_bake_at_once_and_alike(room):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_bake_works_after_a_fork(room):
-    radiosity.bake(room, error=0.3, device="cpu")
+def test_a_bake_works_after_a_fork(room, tmp_path):
+    radiosity.bake(room, error=0.3, device="cpu").save(tmp_path / "parent.png")
     child = os.fork()
     if child == 0:
         light = radiosity.bake(room, error=0.3, device="cpu")
+        light.save(tmp_path / "child.png")
         os._exit(0 if np.isfinite(light.radiosity).all() else 1)
     deadline = time.time() + 60
     while time.time() < deadline:
