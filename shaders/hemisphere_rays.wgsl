@@ -12,8 +12,10 @@ fn hemisphere_rays(
 ) {
     let p = work.points[group.x];
     let point = points[p];
-    let light_count = states[p].light_count;
-    let rays = rays_of_pass(states[p].ray_count, states[p].pending);
+    let state = vec4u(states[p].ray_count, states[p].pending, states[p].light_count, wide_lights(p));
+    let known = uniform_of(lane, state);
+    let rays = rays_of_pass(known.x, known.y);
+    let light_count = known.z;
     for (var k = 0u; k < 2u * light_count; k++) {
         light_sums[k] = Visible();
     }
@@ -45,9 +47,12 @@ fn hemisphere_rays(
             states[p].rays[half].near_light += near.xyz;
         }
         for (var k = 0u; k < light_count; k++) {
+            if ((known.w >> k) & 1u) == 0u {
+                continue;
+            }
             let sum = light_sums[half * light_count + k];
             let of_light = added_up(lane, vec4f(sum.seen, sum.all));
-            if lane == 0u && states[p].lights[k].is_wide != 0u {
+            if lane == 0u {
                 states[p].visible[half][k].seen += of_light.xyz;
                 states[p].visible[half][k].all += of_light.w;
             }

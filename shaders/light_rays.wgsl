@@ -9,12 +9,15 @@ fn light_rays(
 ) {
     let p = work.points[settings.points + group.x];
     let point = points[p];
-    let rays = rays_of_pass(states[p].shadow_count, states[p].pending);
+    let state =
+        vec4u(states[p].shadow_count, states[p].pending, states[p].light_count, wide_lights(p));
+    let known = uniform_of(lane, state);
+    let rays = rays_of_pass(known.x, known.y);
     if rays.start >= rays.end {
         return;
     }
-    for (var k = 0u; k < states[p].light_count; k++) {
-        if states[p].lights[k].is_wide != 0u {
+    for (var k = 0u; k < known.z; k++) {
+        if ((known.w >> k) & 1u) != 0u {
             continue;
         }
         let number = states[p].lights[k].light;

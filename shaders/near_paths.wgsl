@@ -40,7 +40,8 @@ fn near_paths(
         is_covered(states[p].rays[0].near, f32(rays.half)),
         is_covered(states[p].rays[1].near, f32(rays.half)),
     );
-    if rays.start >= rays.end || !(covered[0] || covered[1]) {
+    let has_paths = rays.start < rays.end && (covered[0] || covered[1]);
+    if uniform_of(lane, vec4u(u32(has_paths))).x == 0u {
         return;
     }
     var light = array<vec3f, 2>();

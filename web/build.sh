@@ -17,8 +17,9 @@ npx wasm-opt -O3 --strip-debug --strip-producers --enable-simd --enable-bulk-mem
 
 rm -rf dist
 mkdir dist
+# The glue of wasm-bindgen names a module once for each raw import.
 npx esbuild page/main.js js/worker.js --bundle --format=esm --minify --target=es2022 --external:node:fs/promises \
-    --outdir=dist --entry-names='[name]' --log-level=warning
+    --outdir=dist --entry-names='[name]' --log-level=warning --log-override:duplicate-object-key=silent
 cp pkg/radiosity_bg.wasm dist/radiosity.wasm
 cp page/index.html page/style.css ../scenes/cornell_box.obj ../scenes/cornell_box.mtl dist
 node -e '

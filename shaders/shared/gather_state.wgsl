@@ -36,6 +36,26 @@ fn rays_of_pass(total: u32, pending: u32) -> RayRange {
     return RayRange(start, min(start + settings.pass_rays, end), middle, end, middle);
 }
 
+var<workgroup> of_first: vec4u;
+
+// The value of the first lane, which all lanes have too. WGSL takes control flow for uniform only
+// where it does not depend on buffers that are written: barriers need that.
+fn uniform_of(lane: u32, value: vec4u) -> vec4u {
+    if lane == 0u {
+        of_first = value;
+    }
+    return workgroupUniformLoad(&of_first);
+}
+
+// The lights of a point that its rays over the hemisphere find by themselves, a bit each.
+fn wide_lights(p: u32) -> u32 {
+    var wide = 0u;
+    for (var k = 0u; k < states[p].light_count; k++) {
+        wide |= states[p].lights[k].is_wide << k;
+    }
+    return wide;
+}
+
 // The sum over all lanes, in an order that does not depend on the device.
 fn added_up(lane: u32, value: vec4f) -> vec4f {
     workgroupBarrier();

@@ -27,6 +27,7 @@ mod traced_gather;
 mod traced_rows;
 pub(super) mod traced_scene;
 mod tracing;
+mod wait;
 
 pub use crate::backend::adapter::AdapterInfo;
 pub use device::Gpu;
@@ -35,3 +36,5 @@ pub use limits::GpuLimits;
 pub use rows::HemicubeRows;
 pub use traced_gather::TracedGather;
 pub use traced_rows::TracedRows;
+#[cfg(target_family = "wasm")]
+pub use wait::{BlockOn, set_block_on};

@@ -1,10 +1,14 @@
 // The module, in the thread that calls: loads it once, and bakes.
 
-import init, { Files, bake as bakeFiles, initSync, version } from "../pkg/radiosity.js";
+import init, { Files, ask, initSync, result, version } from "../pkg/radiosity.js";
+import { canSuspend } from "./suspend.js";
 
 export { version };
 
+/** What the module exports without glue, once it is loaded. */
 let loading;
+/** The last bake: one that waits for a device may not be overtaken. */
+let last = Promise.resolve();
 
 /** Loads the module: in Node from the file beside it, elsewhere by its address. */
 export function load(address) {
@@ -13,10 +17,9 @@ export function load(address) {
     const url = address ?? new URL("../pkg/radiosity_bg.wasm", import.meta.url);
     if (typeof process !== "undefined" && process.versions?.node && url.protocol === "file:") {
       const { readFile } = await import("node:fs/promises");
-      initSync({ module: await readFile(url) });
-    } else {
-      await init({ module_or_path: url });
+      return initSync({ module: await readFile(url) });
     }
+    return init({ module_or_path: url });
   })();
   return loading;
 }
@@ -37,10 +40,32 @@ export function arrays(light) {
 }
 
 /**
+ * The GPU that can cast rays here: a name, and whether it is software, which is slower than the
+ * CPU; or what is missing.
+ */
+export async function gpu() {
+  if (!globalThis.navigator?.gpu) return { missing: "there is no WebGPU here" };
+  if (!canSuspend) return { missing: "WebAssembly cannot wait for it (no Promise Integration)" };
+  const adapter = await navigator.gpu.requestAdapter().catch(() => null);
+  if (!adapter) return { missing: "WebGPU has no adapter here" };
+  const { description, vendor, architecture, isFallbackAdapter } = adapter.info;
+  const name = description || [vendor, architecture].filter(Boolean).join(" ") || "unnamed";
+  return { name, isSoftware: isFallbackAdapter ?? adapter.isFallbackAdapter ?? false };
+}
+
+/**
  * Bakes in this thread. `scene` has a name, content and files; `onProgress` and `onLight` answer
  * `false` to stop.
  */
 export function run(scene, options, onProgress, onLight) {
+  const own = last.then(() => runAlone(scene, options, onProgress, onLight));
+  last = own.catch(() => {});
+  return own;
+}
+
+async function runAlone(scene, { device = "auto", ...options }, onProgress, onLight) {
+  const exports = await loading;
+  const { chosen, name, reason } = await choose(device);
   const files = new Files(scene.name, scene.content);
   for (const [name, content] of Object.entries(scene.files ?? {})) files.add(name, content);
   let thrown;
@@ -52,12 +77,30 @@ export function run(scene, options, onProgress, onLight) {
       return false;
     }
   };
-  const baked = bakeFiles(
+  ask(
     files,
-    JSON.stringify(options),
+    JSON.stringify({ ...options, device: chosen }),
     (state) => guard(() => onProgress(JSON.parse(state))),
     (light, state) => guard(() => onLight({ ...arrays(light), ...JSON.parse(state) })),
   );
+  if (chosen === "cpu") exports.work();
+  else await WebAssembly.promising(exports.work)();
+  const baked = result();
   if (thrown !== undefined) throw thrown;
-  return baked;
+  const report = JSON.parse(baked.report());
+  report.deviceName = report.device === "gpu" ? name : null;
+  report.deviceReason = reason ?? null;
+  return { baked, report };
+}
+
+/** What casts rays by this option, the name of a GPU, and why there is none. */
+async function choose(device) {
+  if (device === "cpu") return { chosen: "cpu" };
+  if (device !== "auto" && device !== "gpu") {
+    throw new TypeError(`device: ${JSON.stringify(device)}; give "auto", "cpu" or "gpu"`);
+  }
+  const { name, missing, isSoftware } = await gpu();
+  if (device === "gpu" && missing) throw new Error(`device: no GPU, ${missing}; give "cpu" or "auto"`);
+  const reason = missing ?? (isSoftware ? "its WebGPU is software, slower than the CPU" : undefined);
+  return device === "auto" && reason ? { chosen: "cpu", reason } : { chosen: device, name };
 }

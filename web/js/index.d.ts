@@ -27,6 +27,11 @@ export interface Options {
   sun?: { direction: [number, number, number]; irradiance: Colour };
   /** Refuses files that would be repaired otherwise. */
   strict?: boolean;
+  /**
+   * What casts rays: a GPU by WebGPU ("gpu"), the CPU ("cpu"), or the GPU where there is one that is
+   * not software ("auto", the default). The CPU gives the same bytes everywhere.
+   */
+  device?: "auto" | "cpu" | "gpu";
   /** Hears how far the bake is; answers `false` to stop it with what there is. */
   onProgress?: (progress: Progress) => boolean | void;
   /**
@@ -82,6 +87,11 @@ export interface Report {
   gathers: number;
   /** The scene's upward axis. */
   up: [number, number, number];
+  /** What cast rays, the name of a GPU, and why "auto" took the CPU. */
+  device: "cpu" | "gpu";
+  deviceName: string | null;
+  deviceReason: string | null;
+  /** Why the GPU failed, if it did: the CPU went on. */
   deviceFailure: string | null;
   /** What was odd about the file, and how it was repaired. */
   warnings: string[];
@@ -89,7 +99,7 @@ export interface Report {
 
 export interface Light extends Arrays {
   report: Report;
-  /** The PLY file that the program writes: the same bytes. */
+  /** The PLY file that the program writes, with the same numbers; colours are by a tone curve of its own. */
   ply(): Promise<Uint8Array>;
   /** For viewers: of a glTF scene the same file with light at its vertices. */
   glb(): Promise<Uint8Array>;
@@ -105,6 +115,12 @@ export interface Light extends Arrays {
  * Rejects with an Error that says where in the input, what was found and what would be right.
  */
 export function bake(scene: SceneFiles | File | File[] | FileList, options?: Options): Promise<Light>;
+
+/** The GPU that can cast rays here; or what is missing for it. */
+export function gpu(): Promise<
+  | { name: string; isSoftware: boolean; missing?: undefined }
+  | { missing: string; name?: undefined; isSoftware?: undefined }
+>;
 
 /** Whether WebAssembly has SIMD here, which the module needs. */
 export function hasSimd(): boolean;

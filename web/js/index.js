@@ -1,9 +1,9 @@
 // Bakes light: `bake(scene, options)`. In browsers it runs in a worker of its own, in Node in the
 // thread that calls. `index.d.ts` has what is given and what comes back.
 
-import { arrays, hasSimd, load, run, version } from "./engine.js";
+import { arrays, gpu, hasSimd, load, run, version } from "./engine.js";
 
-export { hasSimd };
+export { gpu, hasSimd };
 
 /** Endings of files that are scenes. */
 const SCENES = ["glb", "gltf", "obj", "stl"];
@@ -29,7 +29,7 @@ export async function moduleVersion() {
 async function direct(scene, options, { onProgress, onLight, signal }, wasm) {
   await load(wasm && new URL(wasm, import.meta.url));
   const goesOn = (answer) => answer !== false && !signal?.aborted;
-  const baked = run(
+  const { baked, report } = await run(
     scene,
     options,
     (state) => goesOn(onProgress(state)),
@@ -37,7 +37,7 @@ async function direct(scene, options, { onProgress, onLight, signal }, wasm) {
   );
   return {
     ...arrays(baked.light()),
-    report: JSON.parse(baked.report()),
+    report,
     ply: async () => baked.ply(),
     glb: async () => baked.glb(),
     bounces: async (count) => arrays(baked.bounces(count)),

@@ -23,8 +23,14 @@ const answers = {
     };
     baked?.free();
     baked = undefined;
-    baked = run(scene, options, (state) => post("progress", state), (light) => post("light", light));
-    return { ...arrays(baked.light()), report: JSON.parse(baked.report()) };
+    const done = await run(
+      scene,
+      options,
+      (state) => post("progress", state),
+      (light) => post("light", light),
+    );
+    baked = done.baked;
+    return { ...arrays(baked.light()), report: done.report };
   },
   ply: () => baked.ply(),
   glb: () => baked.glb(),

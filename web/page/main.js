@@ -1,6 +1,6 @@
 // The page: a scene in, light out.
 
-import { bake, hasSimd } from "../js/index.js";
+import { bake, gpu, hasSimd } from "../js/index.js";
 import { RAMP } from "./colours.js";
 import { Viewer } from "./viewer.js";
 
@@ -38,6 +38,23 @@ function showSettings() {
   at("time-value").value = time === undefined ? "as long as it takes" : `${words(time)} s`;
   const stops = +at("exposure").value;
   at("exposure-value").value = `${stops > 0 ? "+" : ""}${stops} stops`;
+}
+
+/** Says which GPU can cast rays, and offers it. */
+async function showGpu() {
+  const { name, isSoftware, missing } = await gpu();
+  at("gpu").textContent = missing
+    ? `GPU: none, ${missing}.`
+    : `GPU: ${name}${isSoftware ? ", software: slower than the CPU, used where it is chosen" : ""}.`;
+  at("device").querySelector("[value=gpu]").disabled = Boolean(missing);
+}
+
+/** Says what cast the rays of a bake. */
+function showRays({ device, deviceName, deviceReason, deviceFailure }) {
+  const by = device === "gpu" ? `GPU, ${deviceName}` : "CPU, one thread";
+  const why = deviceReason ? `, since ${deviceReason}` : "";
+  const failure = deviceFailure ? ` It failed, and the CPU went on: ${deviceFailure}.` : "";
+  at("rays").textContent = `Rays by the ${by}${why}.${failure}`;
 }
 
 function say(text) {
@@ -80,6 +97,7 @@ async function start() {
     const done = await bake(scene, {
       error,
       time,
+      device: at("device").value,
       wasm: WASM,
       signal: own.signal,
       onLight: show,
@@ -121,6 +139,7 @@ function finish(done, seconds) {
   at("warnings").replaceChildren(
     ...report.warnings.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
   );
+  showRays(report);
   for (const id of ["glb", "ply"]) at(id).disabled = false;
   at("png").disabled = !viewer.png;
   at("canvas").setAttribute(
@@ -244,8 +263,8 @@ addEventListener("drop", async (event) => {
 
 const css = RAMP.map((c) => `rgb(${c.map((x) => Math.round(255 * x)).join(" ")})`).join(", ");
 at("ramp").style.background = `linear-gradient(90deg, ${css})`;
-at("device").textContent = "Device: rays on the CPU, one thread, WebAssembly with SIMD.";
 showSettings();
+showGpu();
 if (!hasSimd()) {
   say("This browser has no SIMD for WebAssembly, which this page needs: take one of 2021 or later.");
   for (const id of ["box", "pick", "bake"]) at(id).disabled = true;

@@ -1,24 +1,21 @@
 //! What the package for JavaScript is made of: a bake of bytes, and its light as arrays and files.
 //!
 //! ```text
-//!   bytes, options (JSON) ─► Bake ─► arrays, PLY, GLB
+//!   bytes, options (JSON) ─► task ─► Bake ─► arrays, PLY, GLB
 //!                             └─ calls back with progress, and with light as it gets better
 //! ```
 
 mod callbacks;
 mod light;
 mod options;
+mod suspend;
+mod task;
 
-use std::sync::Arc;
-
-use js_sys::Function;
 use radiosity::io::{GlbSettings, Input, ToneCurve, write_lit_gltf};
 use radiosity::{Backend, BakeResult, BakeSettings, Error, solver, write_glb, write_ply};
 use wasm_bindgen::prelude::*;
 
-use callbacks::Callbacks;
 use light::Light;
-use options::Options;
 
 /// Shows panics where programs look for errors.
 #[wasm_bindgen(start)]
@@ -61,7 +58,7 @@ impl Files {
 }
 
 impl Files {
-    fn with<T>(&self, read: impl FnOnce(Input<'_>) -> T) -> T {
+    pub(crate) fn with<T>(&self, read: impl FnOnce(Input<'_>) -> T) -> T {
         let others: Vec<(&str, &[u8])> =
             self.others.iter().map(|(name, content)| (&**name, &**content)).collect();
         read(Input::bytes(&self.name, &self.content).with_files(&others))
@@ -74,31 +71,14 @@ impl Files {
 pub struct Bake {
     files: Files,
     baked: BakeResult,
-}
-
-/// Bakes the scene of `files` by `options`, an object as JSON. `on_progress(json)` hears how far it
-/// is and answers whether to go on; `on_light(light, json)` gets light as it gets better.
-#[wasm_bindgen]
-pub fn bake(
-    files: Files,
-    options: &str,
-    on_progress: Function,
-    on_light: Function,
-) -> Result<Bake, JsError> {
-    let options = Options::parse(options).map_err(js)?;
-    let scene = files.with(|file| options.scene(file)).map_err(js)?;
-    let scene = Arc::new(scene);
-    let mut callbacks = Callbacks::new(on_progress, on_light);
-    callbacks.show_shape(&scene);
-    let baked = options.target().map_err(js)?.bake(scene, &Backend::Cpu, |p| callbacks.hear(p));
-    Ok(Bake { files, baked: baked.map_err(js)? })
+    is_on_gpu: bool,
 }
 
 #[wasm_bindgen]
 impl Bake {
     /// What was measured of it, as JSON.
     pub fn report(&self) -> String {
-        light::report(&self.baked)
+        light::report(&self.baked, self.is_on_gpu)
     }
 
     /// Light at vertices.

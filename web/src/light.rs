@@ -78,7 +78,7 @@ impl Light {
 }
 
 /// What was measured of a bake, as JSON.
-pub fn report(baked: &BakeResult) -> String {
+pub fn report(baked: &BakeResult, is_on_gpu: bool) -> String {
     let BakeResult { estimate, outcome, light, groups, .. } = baked;
     let scene = light.mesh.scene();
     let warnings: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
@@ -104,6 +104,7 @@ pub fn report(baked: &BakeResult) -> String {
         "triangles": scene.triangles().len(),
         "gathers": light.gather_count,
         "up": scene.up().to_array(),
+        "device": if is_on_gpu { "gpu" } else { "cpu" },
         "deviceFailure": baked.device_failure.as_ref().map(ToString::to_string),
         "warnings": warnings,
     })

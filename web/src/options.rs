@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use radiosity::backend::AdapterKind;
+use radiosity::backend::gpu::Gpu;
 use radiosity::glam::DVec3;
 use radiosity::io::Input;
-use radiosity::{BakeTarget, Error, ErrorKind, Rgb, Scene, SceneSettings, Sky, Sun};
+use radiosity::{Backend, BakeTarget, Error, ErrorKind, Rgb, Scene, SceneSettings, Sky, Sun};
 use serde::Deserialize;
+
+use crate::suspend;
 
 /// See `js/index.d.ts`, which has the same names.
 #[derive(Debug, Default, Deserialize)]
@@ -20,6 +24,17 @@ pub struct Options {
     sky: Option<Colour>,
     sun: Option<GivenSun>,
     strict: bool,
+    device: Device,
+}
+
+/// What casts rays: the CPU, a device by WebGPU, or that where it can be opened.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+enum Device {
+    #[default]
+    Cpu,
+    Gpu,
+    Auto,
 }
 
 /// A number for all channels, or three.
@@ -75,6 +90,15 @@ impl Options {
         scene.with_sky(sky)
     }
 
+    /// What casts rays, and why that is not the device that was wanted.
+    pub fn backend(&self) -> Result<(Backend, Option<Error>), Error> {
+        match self.device {
+            Device::Cpu => Ok((Backend::Cpu, None)),
+            Device::Gpu => Ok((gpu()?, None)),
+            Device::Auto => Ok(gpu().map_or_else(|e| (Backend::Cpu, Some(e)), |gpu| (gpu, None))),
+        }
+    }
+
     /// How far to bake: to 5 % if nothing is said.
     pub fn target(&self) -> Result<BakeTarget, Error> {
         let time = self.time.map(|seconds| {
@@ -92,4 +116,12 @@ impl Options {
             (error, None) => BakeTarget::Error(error.unwrap_or(0.05)),
         })
     }
+}
+
+/// The browser's device: it casts rays even if it is software.
+fn gpu() -> Result<Backend, Error> {
+    suspend::allow_waits();
+    let gpu = Gpu::new(None)?;
+    let is_software = gpu.adapter().kind == AdapterKind::Cpu;
+    Ok(Backend::Gpu(if is_software { gpu.assuming(AdapterKind::Other) } else { gpu }))
 }

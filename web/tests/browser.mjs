@@ -11,14 +11,16 @@ import puppeteer from "puppeteer-core";
 const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm" };
 const HERE = path.dirname(new URL(import.meta.url).pathname);
 
-/** Serves the static page; its address and what ends it. */
-export async function serve(folder = path.join(HERE, "../dist")) {
+/** Serves the static page, with `before` in front of each script; its address and what ends it. */
+export async function serve({ before = "", folder = path.join(HERE, "../dist") } = {}) {
   const server = createServer((request, response) => {
     const name = request.url === "/" ? "index.html" : path.basename(request.url.split("?")[0]);
     const file = path.join(folder, name);
     if (!fs.existsSync(file)) return response.writeHead(404).end();
     const type = TYPES[path.extname(name).slice(1)] ?? "application/octet-stream";
-    response.writeHead(200, { "Content-Type": type }).end(fs.readFileSync(file));
+    const head = path.extname(name) === ".js" ? before : "";
+    response.writeHead(200, { "Content-Type": type });
+    response.end(Buffer.concat([Buffer.from(head), fs.readFileSync(file)]));
   });
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
   return { address: `http://127.0.0.1:${server.address().port}/`, end: () => server.close() };

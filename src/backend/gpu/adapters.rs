@@ -2,17 +2,19 @@
 
 use super::error::place;
 use super::limits::GpuLimits;
+use super::wait;
 use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
 
 /// The adapter whose name contains `name` in any case, or the best: [`crate::Gpu::new`].
 pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
+    wait::check()?;
     let from_env = std::env::var("WGPU_ADAPTER_NAME").ok();
     let wanted = name.map(str::to_string).or(from_env).unwrap_or_default();
     let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     let backends = descriptor.backends;
     let instance = wgpu::Instance::new(descriptor);
-    let mut found = pollster::block_on(instance.enumerate_adapters(backends));
+    let mut found = wait::block_on(instance.enumerate_adapters(backends));
     // A stable sort: ties keep the order of the driver loader.
     found.sort_by_key(|a| kind(a.get_info().device_type));
     let names: Vec<String> = found.iter().map(|a| a.get_info().name).collect();
@@ -21,9 +23,14 @@ pub fn choose(name: Option<&str>) -> Result<wgpu::Adapter, Error> {
         return Ok(found.swap_remove(index));
     }
     let (found, remedy) = if names.is_empty() {
-        let remedy = "install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers libvulkan1; \
-             Fedora: mesa-vulkan-drivers vulkan-loader; software rendering included), \
-             or make rows on the CPU (RayRows; --cpu in the examples)";
+        let remedy = match cfg!(target_family = "wasm") {
+            true => "take a browser with WebGPU, or use the CPU",
+            false => {
+                "install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers libvulkan1; \
+                 Fedora: mesa-vulkan-drivers vulkan-loader; software rendering included), \
+                 or make rows on the CPU (RayRows; --cpu in the examples)"
+            }
+        };
         ("no graphics adapter".to_string(), remedy.to_string())
     } else {
         let found = format!("no adapter with '{wanted}' in its name");
@@ -43,7 +50,7 @@ pub fn open(
         required_limits: limits.requested(&adapter.limits()),
         ..Default::default()
     };
-    pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
+    wait::block_on(adapter.request_device(&descriptor)).map_err(|e| {
         let remedy = "choose another adapter, or update its driver";
         let place = place(&adapter.get_info().name);
         Error::new(ErrorKind::Device, place, e.to_string(), remedy).with_source(e)
@@ -53,7 +60,9 @@ pub fn open(
 /// Description of an adapter from wgpu.
 pub fn describe(info: wgpu::AdapterInfo) -> AdapterInfo {
     let driver = format!("{} {} ({:?})", info.driver, info.driver_info, info.backend);
-    AdapterInfo { name: info.name, kind: kind(info.device_type), driver }
+    // Some browsers keep names to themselves.
+    let name = if info.name.is_empty() { "unnamed".into() } else { info.name };
+    AdapterInfo { name, kind: kind(info.device_type), driver: driver.trim().into() }
 }
 
 fn kind(device: wgpu::DeviceType) -> AdapterKind {

@@ -3,21 +3,21 @@
 //! ```text
 //! with_error_scopes(work)      push scopes → work() → pop scopes → an error, or work's result
 //! retry_with_smaller_batches   make(batch), make(batch/2), … until it fits in memory
-//! wait                         poll until all submitted work is done; at most 120 s
+//! wait                         until all submitted work is done
 //! ```
 //!
 //! A lost device stays lost: the reason is recorded once, and every later use returns it.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
-use super::adapters;
+use futures_channel::oneshot;
+
 use super::error::{device_error, invalid_result, message};
 use super::limits::{self, GpuLimits};
 use super::memory::{Memory, MemoryBudget};
 use super::traced_scene::TracedScene;
 use super::tracing::Tracing;
+use super::{adapters, wait};
 use crate::backend::adapter::{AdapterInfo, AdapterKind};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
@@ -70,8 +70,8 @@ impl Gpu {
             };
             record(&lost, format!("the device was lost: {why}"));
         });
-        if gpu.assumed != AdapterKind::Cpu {
-            // All passes of rays are ready when the scene is loaded.
+        // All passes of rays are ready when the scene is loaded. Browsers compile on their own.
+        if gpu.assumed != AdapterKind::Cpu && cfg!(not(target_family = "wasm")) {
             let (device, tracing) = (gpu.device.clone(), gpu.tracing.clone());
             std::thread::spawn(move || {
                 tracing.gather_pipelines(&device);
@@ -100,6 +100,7 @@ impl Gpu {
         queue: wgpu::Queue,
         limits: &GpuLimits,
     ) -> Result<Gpu, Error> {
+        wait::check()?;
         limits::check_device(&device.adapter_info().name, &device.limits())?;
         Ok(Gpu::from_parts(device, queue, limits))
     }
@@ -163,9 +164,9 @@ impl Gpu {
         self.check()?;
         let scopes = [Internal, Validation, OutOfMemory].map(|f| self.device.push_error_scope(f));
         let result = work();
-        // Scopes are popped in reverse order.
-        let errors = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop()));
-        let errors: Vec<wgpu::Error> = errors.collect();
+        // Scopes are popped in reverse order, all before the first is waited for.
+        let popped: Vec<_> = scopes.into_iter().rev().map(wgpu::ErrorScopeGuard::pop).collect();
+        let errors: Vec<wgpu::Error> = popped.into_iter().filter_map(wait::block_on).collect();
         self.check()?;
         let Some(error) = errors.into_iter().next() else { return result };
         let kind = match error {
@@ -214,39 +215,26 @@ impl Gpu {
 
     /// Waits until all submitted work is done.
     pub(super) fn wait(&self) -> Result<(), Error> {
-        self.wait_for(None)
+        let (sender, receiver) = oneshot::channel();
+        self.queue.on_submitted_work_done(move || _ = sender.send(()));
+        self.answer(None, receiver)
     }
 
-    /// Waits until this submission and all before it are done; with `None`, until all are.
-    pub(super) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<(), Error> {
-        // A batch takes a fraction of a second, on slow devices seconds; watchdogs of drivers act
-        // earlier. Plain choice.
-        let seconds = 120;
-        let poll = || {
-            let timeout = Some(Duration::from_secs(seconds));
-            let submission_index = submission.clone();
-            self.device.poll(wgpu::PollType::Wait { submission_index, timeout })
-        };
+    /// What `receiver` is sent once this submission and all before it are done; with `None`, once
+    /// all are.
+    fn answer<T>(
+        &self,
+        submission: Option<wgpu::SubmissionIndex>,
+        receiver: oneshot::Receiver<T>,
+    ) -> Result<T, Error> {
         self.check()?;
-        // wgpu 30 panics when the device is lost during a wait.
-        let waited = catch_unwind(AssertUnwindSafe(poll));
+        let is_lost = || self.check().is_err();
+        let answer = wait::answer(&self.device, &self.queue, submission, receiver, is_lost);
         self.check()?;
-        let found = match waited {
-            Ok(Ok(_)) => return Ok(()),
-            Ok(Err(wgpu::PollError::Timeout)) => {
-                format!("no answer for {seconds} s")
-            }
-            Ok(Err(e)) => {
-                // A device that was lost before the submission reports it when it is polled again.
-                let poll = || self.device.poll(wgpu::PollType::Poll);
-                let _ = catch_unwind(AssertUnwindSafe(poll));
-                self.check()?;
-                e.to_string()
-            }
-            Err(_) => "the device was lost".into(),
-        };
-        record(&self.lost, found);
-        self.check()
+        answer.map_err(|why| {
+            record(&self.lost, why.clone());
+            self.device_error(ErrorKind::Device, why)
+        })
     }
 
     /// Calls `read` with the bytes that `submission` has copied to a mappable buffer. The caller
@@ -257,13 +245,11 @@ impl Gpu {
         submission: wgpu::SubmissionIndex,
         read: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, Error> {
-        let (sender, receiver) = std::sync::mpsc::channel();
+        let (sender, receiver) = oneshot::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
-        self.wait_for(Some(submission))?;
         let failed = |found: String| self.device_error(ErrorKind::Device, found);
-        if !matches!(receiver.try_recv(), Ok(Ok(()))) {
-            return Err(failed("results could not be read back".into()));
-        }
+        self.answer(Some(submission), receiver)?
+            .map_err(|_| failed("results could not be read back".into()))?;
         let view = slice.get_mapped_range().map_err(|e| failed(e.to_string()))?;
         Ok(read(&view))
     }
@@ -386,7 +372,7 @@ mod tests {
     fn callers_device(limits: wgpu::Limits) -> (wgpu::Device, wgpu::Queue) {
         let adapter = adapters::choose(None).unwrap();
         let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
-        pollster::block_on(adapter.request_device(&descriptor)).unwrap()
+        wait::block_on(adapter.request_device(&descriptor)).unwrap()
     }
 
     fn rows(gpu: &Gpu, mesh: &Mesh) -> Result<Vec<Row>, Error> {

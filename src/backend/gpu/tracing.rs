@@ -70,14 +70,16 @@ impl GatherPass {
 pub type GatherPipelines = [wgpu::ComputePipeline; 5];
 
 fn gather_pipelines(device: &wgpu::Device) -> GatherPipelines {
+    let compile = |(_, entry_point): (GatherPass, &str)| {
+        pipeline::compute(device, &format!("{entry_point}.wgsl"), entry_point)
+    };
+    if cfg!(target_family = "wasm") {
+        return GatherPass::ALL.map(compile);
+    }
     // Drivers take up to a second for one, on one core. Not in the thread pool: one of its threads
     // may be waiting for them.
     std::thread::scope(|scope| {
-        let compile = |(_, entry_point)| {
-            let file = format!("{entry_point}.wgsl");
-            scope.spawn(move || pipeline::compute(device, &file, entry_point))
-        };
-        let threads = GatherPass::ALL.map(compile);
+        let threads = GatherPass::ALL.map(|pass| scope.spawn(move || compile(pass)));
         threads.map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
     })
 }
