@@ -5,6 +5,7 @@ mod collapse;
 pub(crate) mod cut_outs;
 mod instances;
 pub(crate) mod lit_sides;
+mod min_max;
 pub(crate) mod offset;
 pub(crate) mod panes;
 mod ray32;

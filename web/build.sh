@@ -9,11 +9,6 @@ cargo build --locked --release --target wasm32-unknown-unknown -p radiosity-web 
     --config 'target.wasm32-unknown-unknown.rustflags=["-C", "target-feature=+simd128"]'
 cargo run --locked --release --quiet -p radiosity-web-bindgen -- \
     ../target/wasm32-unknown-unknown/release/radiosity_web.wasm pkg
-# The features that rustc uses by default, and SIMD.
-npx wasm-opt -O3 --strip-debug --strip-producers --enable-simd --enable-bulk-memory \
-    --enable-bulk-memory-opt --enable-sign-ext --enable-mutable-globals \
-    --enable-nontrapping-float-to-int --enable-reference-types --enable-multivalue \
-    pkg/radiosity_bg.wasm -o pkg/radiosity_bg.wasm
 
 rm -rf dist
 mkdir dist

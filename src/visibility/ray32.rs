@@ -18,6 +18,7 @@ use glam::{DVec3, Vec3A};
 use crate::geometry::aabb::Aabb;
 
 use super::collapse::WIDTH;
+use super::min_max::MinMax;
 use super::sah_tree::Aabb32;
 
 /// Longest side of the scene in the hierarchy's own unit. Plain choice: products of three of them
@@ -163,8 +164,9 @@ impl Ray32 {
             planes[y ^ 1][1] * inverse[1],
             planes[z ^ 1][2] * inverse[2],
         ];
-        let entry = near_x.max(near_y).max(near_z.max(f32x8::splat(simd, self.start)));
-        let exit = far_x.min(far_y).min(far_z.min(f32x8::splat(simd, self.end)));
+        let (start, end) = (f32x8::splat(simd, self.start), f32x8::splat(simd, self.end));
+        let entry = near_x.larger(near_y).larger(near_z.larger(start));
+        let exit = far_x.smaller(far_y).smaller(far_z.smaller(end));
         (entry.simd_le(exit).to_bitmask() as u32, entry)
     }
 }

@@ -18,6 +18,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::{Simd, SimdBase, f32x8};
 
 use super::collapse::WIDTH;
+use super::min_max::MinMax;
 use super::ray32::{LoadedPlanes, Ray32, planes_from, splat};
 use super::wide_bvh::{Child, ChildKind, Visit, WideBvh};
 
@@ -123,7 +124,7 @@ fn squared_distances<S: Simd>(simd: S, [low, high]: &LoadedPlanes<S>) -> f32x8<S
     let none = f32x8::splat(simd, 0.0);
     let mut squares = none;
     for axis in 0..3 {
-        let outside = low[axis].max(-high[axis]).max(none);
+        let outside = low[axis].larger(-high[axis]).larger(none);
         squares = outside * outside + squares;
     }
     squares

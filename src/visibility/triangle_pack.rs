@@ -20,6 +20,7 @@
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x4};
 use glam::{DVec3, Vec3A};
 
+use super::min_max::MinMax;
 use super::ray32::{Ray32, SCENE_SIZE, splat};
 use super::sah_tree::MAX_LEAF_SIZE;
 
@@ -121,7 +122,7 @@ impl<S: Simd> PackSeen<S> {
         let (u, v) = (front.select(u, -u), front.select(v, -v));
         let (rise, steep) = (front.select(self.rise, -self.rise), front.select(facing, -facing));
         let [margin, rise_margin] = self.margins;
-        let inside = u.min(v).simd_ge(-margin) & (u + v).simd_le(steep + margin + margin);
+        let inside = u.smaller(v).simd_ge(-margin) & (u + v).simd_le(steep + margin + margin);
         let within = rise.simd_ge(steep.mul_sub(f32x4::splat(simd, ray.start), rise_margin))
             & rise.simd_le(steep.mul_add(f32x4::splat(simd, ray.end), rise_margin));
         (inside & within).to_bitmask() as u32

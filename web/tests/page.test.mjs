@@ -88,6 +88,19 @@ for (const name of ["chromium", "firefox"]) {
       assert.deepEqual(errors, []);
     });
 
+    test("a tab in the background bakes on", async () => {
+      const { page, errors } = opened;
+      await drop(page, BOX);
+      await status(page, /Baking/);
+      const other = await page.browser().newPage();
+      await other.bringToFront();
+      assert.match(await status(page, /cornell_box\.obj: error/), /reached/);
+      assert.ok(await page.evaluate(() => document.hidden));
+      await other.close();
+      await page.bringToFront();
+      assert.deepEqual(errors, []);
+    });
+
     test("a broken file is said, and the next one baked", async () => {
       const { page, errors } = opened;
       await drop(page, [["broken.glb", Buffer.from("glTF but no more")]]);
@@ -104,12 +117,12 @@ for (const name of ["chromium", "firefox"]) {
       const { page } = opened;
       await page.focus("#canvas");
       const order = [];
-      for (let k = 0; k < 14; k++) {
+      for (let k = 0; k < 15; k++) {
         order.push(await page.evaluate(() => document.activeElement.id));
         await page.keyboard.press("Tab");
       }
       const draws = await page.$eval("#png", (e) => !e.disabled);
-      const all = "canvas pick box error time bake quantity exposure elements glb ply png".split(" ");
+      const all = "canvas pick box error time device bake quantity exposure elements glb ply png".split(" ");
       const wanted = all.filter((id) => draws || id !== "png");
       assert.deepEqual(order.slice(0, wanted.length), wanted);
       // Arrows turn the picture.
