@@ -8,6 +8,7 @@
 mod callbacks;
 mod light;
 mod options;
+#[cfg(target_family = "wasm")]
 mod suspend;
 mod task;
 

@@ -10,8 +10,6 @@ use radiosity::io::Input;
 use radiosity::{Backend, BakeTarget, Error, ErrorKind, Rgb, Scene, SceneSettings, Sky, Sun};
 use serde::Deserialize;
 
-use crate::suspend;
-
 /// See `js/index.d.ts`, which has the same names.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
@@ -120,7 +118,8 @@ impl Options {
 
 /// The browser's device: it casts rays even if it is software.
 fn gpu() -> Result<Backend, Error> {
-    suspend::allow_waits();
+    #[cfg(target_family = "wasm")]
+    crate::suspend::allow_waits();
     let gpu = Gpu::new(None)?;
     let is_software = gpu.adapter().kind == AdapterKind::Cpu;
     Ok(Backend::Gpu(if is_software { gpu.assuming(AdapterKind::Other) } else { gpu }))

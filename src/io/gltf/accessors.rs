@@ -194,11 +194,13 @@ impl<'a> Values<'a> {
     }
 
     /// The bytes of item `item`: zeros where it has none.
+    #[cfg(feature = "light-map")]
     pub fn raw(&self, item: usize) -> Vec<u8> {
         self.bytes(item).map_or_else(|| vec![0; self.item_bytes()], <[u8]>::to_vec)
     }
 
     /// Item `item` as the numbers that the file has, without normalisation.
+    #[cfg(feature = "light-map")]
     pub fn raw_numbers<const N: usize>(&self, item: usize) -> [f64; N] {
         self.scaled(item, false)
     }

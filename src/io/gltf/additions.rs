@@ -10,6 +10,7 @@ use crate::io::Output;
 
 /// Targets of buffer views: attributes of vertices, and indices of them.
 pub(super) const ARRAY_BUFFER: u32 = 34962;
+#[cfg(feature = "light-map")]
 pub(super) const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// A document, and new numbers for it.
