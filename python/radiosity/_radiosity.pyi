@@ -171,7 +171,7 @@ def verify_solution(
     progress: Report,
 ) -> Dict[str, Any]: ...
 def atlas(
-    scene: Scene, pixels: Optional[int], texel: float, coordinates: str, padding: int
+    scene: Scene, pixels: Optional[int], texel: Optional[float], coordinates: str, padding: int
 ) -> Atlas: ...
 def light_map(
     atlas: Atlas, bake: Bake, error: float, threads: int, progress: Report

@@ -148,12 +148,9 @@ def light_map(
         raise _check.wrong("size and texel", "both", "give one of them")
     border = int(_check.number("padding", padding, least=3, most=2048))
     native = as_scene(scene)._native
-    edge = 1.0 if texel is None else _check.number("texel", texel, above=0.0)
-    if texel is None and size is None:
-        atlas = _smallest(native, coordinates, border)
-    else:
-        pixels = None if size is None else int(_check.number("size", size, least=1, most=8192))
-        atlas = _radiosity.atlas(native, pixels, edge, coordinates, border)
+    edge = None if texel is None else _check.number("texel", texel, above=0.0)
+    pixels = None if size is None else int(_check.number("size", size, least=1, most=8192))
+    atlas = _radiosity.atlas(native, pixels, edge, coordinates, border)
     light = bake(
         Scene._of(atlas.scene), error, device=device, threads=threads, progress=progress
     )
@@ -163,13 +160,3 @@ def light_map(
         atlas, light._native, error, thread_count(threads), callback(progress)
     )
     return LightMap._of(made, light)
-
-
-def _smallest(native: _radiosity.Scene, coordinates: str, padding: int) -> _radiosity.Atlas:
-    for pixels in (64, 128, 256, 512, 1024):
-        try:
-            return _radiosity.atlas(native, pixels, 1.0, coordinates, padding)
-        except ValueError as error:
-            if "texels along a side" not in str(error):
-                raise
-    return _radiosity.atlas(native, 2048, 1.0, coordinates, padding)

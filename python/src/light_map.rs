@@ -31,18 +31,19 @@ pub struct PyLightMap {
 #[derive(Debug)]
 pub struct PyAtlas(Atlas);
 
-/// Lays out the surfaces of a scene: by pixels along a side, or the edge of a texel.
+/// Lays out the surfaces of a scene: by pixels along a side, by the edge of a texel, or in the
+/// fewest texels that they have room in.
 #[pyfunction]
 pub fn atlas(
     py: Python<'_>,
     scene: &PyScene,
     pixels: Option<u32>,
-    texel: f64,
+    texel: Option<f64>,
     coordinates: &str,
     padding: u32,
 ) -> PyResult<PyAtlas> {
-    let resolution = pixels.map_or(Resolution::TexelSize(texel), Resolution::Pixels);
-    let mut settings = LayoutSettings::new(resolution);
+    let resolution = pixels.map(Resolution::Pixels).or(texel.map(Resolution::TexelSize));
+    let mut settings = LayoutSettings::new(resolution.unwrap_or(Resolution::Pixels(1)));
     settings.padding = padding;
     settings.coordinates = match coordinates {
         "file" => Coordinates::Given,
@@ -50,7 +51,11 @@ pub fn atlas(
         _ => Coordinates::Auto,
     };
     let scene = scene.0.clone();
-    run_at_once(py, || Atlas::with_settings(scene, &settings)).map(PyAtlas)
+    let lay_out = || match resolution {
+        Some(_) => Atlas::with_settings(scene, &settings),
+        None => Atlas::in_fewest_texels(scene, &settings),
+    };
+    run_at_once(py, lay_out).map(PyAtlas)
 }
 
 #[pymethods]

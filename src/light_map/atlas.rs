@@ -83,6 +83,25 @@ impl Atlas {
         Ok(Atlas { scene, size, coordinates, pages, page_of, padding, charts, unusable })
     }
 
+    /// The same in the fewest texels along a side, of 64, 128, … 2048, that surfaces have room in;
+    /// the resolution of `settings` is not used.
+    ///
+    /// # Errors
+    /// Those of [`Atlas::with_settings`].
+    pub fn in_fewest_texels(
+        scene: impl Into<Arc<Scene>>,
+        settings: &LayoutSettings,
+    ) -> Result<Atlas, Error> {
+        let scene = scene.into();
+        let of = |pixels: u32| {
+            let resolution = Resolution::Pixels(pixels);
+            Atlas::with_settings(scene.clone(), &LayoutSettings { resolution, ..*settings })
+        };
+        let mut sizes = (6..11).map(|doublings| of(1 << doublings));
+        let fits = |atlas: &Result<Atlas, Error>| !matches!(atlas, Err(e) if e.kind() == ErrorKind::Setting);
+        sizes.find(fits).unwrap_or_else(|| of(2048))
+    }
+
     /// The maps, side by side in the one of the atlas: one unless the settings ask for more.
     pub fn pages(&self) -> &[Page] {
         &self.pages

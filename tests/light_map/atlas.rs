@@ -1,7 +1,7 @@
 //! Where surfaces lie in a light map.
 
 use glam::{DVec2, DVec3};
-use radiosity::light_map::{Atlas, Coordinates, Resolution, Unusable};
+use radiosity::light_map::{Atlas, Coordinates, LayoutSettings, Resolution, Unusable};
 use radiosity::scene::Sides;
 use radiosity::{ErrorKind, Scene, SceneSettings};
 
@@ -137,4 +137,20 @@ fn resolutions_out_of_range_are_refused() {
             assert_eq!(e.kind(), ErrorKind::Setting, "{resolution:?}: {e}");
         }
     }
+}
+
+#[test]
+fn the_fewest_texels_have_room_and_half_as_many_do_not() {
+    let scene = cornell_box(f64::INFINITY).scene().clone();
+    let mut settings = LayoutSettings::new(Resolution::Pixels(1));
+    (settings.coordinates, settings.padding) = (Coordinates::Unwrapped, 8);
+    let atlas = Atlas::in_fewest_texels(scene.clone(), &settings).unwrap();
+    // 17 charts and 16 texels between them.
+    assert!(atlas.width().is_power_of_two() && atlas.width() > 64, "{}", atlas.width());
+    settings.resolution = Resolution::Pixels(atlas.width() / 2);
+    let refused = Atlas::with_settings(scene.clone(), &settings).unwrap_err();
+    assert_eq!(refused.kind(), ErrorKind::Setting);
+    settings.padding = 2;
+    let refused = Atlas::in_fewest_texels(scene, &settings).unwrap_err();
+    assert!(refused.to_string().contains("padding of 2"), "{refused}");
 }

@@ -2,7 +2,6 @@
 
 mod files;
 
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,7 +10,7 @@ use clap::Args;
 use files::{BINDINGS, Bind, FORMATS, Format, print_layout};
 use radiosity::light_map::{Atlas, Coordinates, LayoutSettings, LightMap, Maps, Resolution};
 use radiosity::verify::Estimate;
-use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, ErrorKind, Rgb, Scene, Sky};
+use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky};
 
 use crate::args::{
     self, DeviceOptions, List, MeasureOptions, Names, Output, SHARE, Stop, one_of, some_of, value,
@@ -22,8 +21,8 @@ use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
 use crate::viewer_options::ViewerOptions;
 
-/// Texels along a side where the error asked for says how many: the fewest and the most.
-const PIXELS: RangeInclusive<u32> = 64..=2048;
+/// Maximum number of texels along a side where the error asked for says how many.
+const MAX_PIXELS: u32 = 2048;
 
 /// Share of the error asked for that may be lost between texels: it leaves 0.6 for the light, since
 /// squares add up. Plain choice: as many texels again would leave more than paths cost.
@@ -239,19 +238,9 @@ impl Options {
     /// number was given. Tells where the file's coordinates do not do.
     fn first_atlas(&self, scene: Scene) -> Result<Atlas, Error> {
         let scene = Arc::new(scene);
-        let atlas = progress::of_stage("laying out surfaces", || {
-            if let Some(resolution) = self.resolution() {
-                return self.atlas(scene, resolution);
-            }
-            let mut pixels = *PIXELS.start();
-            loop {
-                match self.atlas(scene.clone(), Resolution::Pixels(pixels)) {
-                    Err(e) if e.kind() == ErrorKind::Setting && pixels < *PIXELS.end() => {
-                        pixels *= 2;
-                    }
-                    atlas => return atlas,
-                }
-            }
+        let atlas = progress::of_stage("laying out surfaces", || match self.resolution() {
+            Some(resolution) => Atlas::with_settings(scene, &self.layout(resolution)),
+            None => Atlas::in_fewest_texels(scene, &self.layout(Resolution::Pixels(MAX_PIXELS))),
         })?;
         if let Some(unusable) = atlas.unusable() {
             eprintln!("note: surfaces are laid out anew, since texture coordinates are {unusable}");
@@ -259,7 +248,7 @@ impl Options {
         Ok(atlas)
     }
 
-    fn atlas(&self, scene: Arc<Scene>, resolution: Resolution) -> Result<Atlas, Error> {
+    fn layout(&self, resolution: Resolution) -> LayoutSettings {
         let mut settings = LayoutSettings::new(resolution);
         (settings.coordinates, settings.padding) = (self.coordinates, self.padding);
         settings.maps = match self.atlas {
@@ -267,7 +256,7 @@ impl Options {
             None if self.each_group => Maps::EachGroup,
             None => Maps::One,
         };
-        Atlas::with_settings(scene, &settings)
+        settings
     }
 
     /// How irradiance changes with the normal, if that is asked for.
@@ -330,17 +319,17 @@ impl Options {
             let Some(shown) = shown.filter(|_| self.resolution().is_none()) else {
                 return Ok((map, shown));
             };
-            if shown.value <= between || pixels >= *PIXELS.end() {
+            if shown.value <= between || pixels >= MAX_PIXELS {
                 return Ok((map, Some(shown)));
             }
             let lost = 100.0 * shown.value;
             eprintln!("{pixels} texels along a side lose {lost:.2} % of the light between them");
             // The error falls no faster than texels become small.
             let times = libm::exp2(libm::log2(shown.value / between).floor().max(1.0));
-            let pixels = (f64::from(pixels) * times).min(f64::from(*PIXELS.end()));
+            let pixels = (f64::from(pixels) * times).min(f64::from(MAX_PIXELS));
             coarser = Some((map, shown));
             atlas = progress::of_stage("laying out surfaces", || {
-                self.atlas(scene, Resolution::Pixels(pixels as u32))
+                Atlas::with_settings(scene, &self.layout(Resolution::Pixels(pixels as u32)))
             })?;
         }
     }
