@@ -138,6 +138,7 @@ pub mod verify;
 pub mod vertex;
 pub mod view_factor;
 mod visibility;
+mod whole_file;
 
 pub use glam;
 

@@ -10,6 +10,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("progress", "error"),
     ("ranks", "error"),
     ("geometry", ""),
+    ("whole_file", ""),
     ("linear", ""),
     ("sampling", "error geometry"),
     ("scene", "error geometry"),
@@ -20,7 +21,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("mesh", "error geometry sampling scene visibility"),
     ("hemicube", "error form_factor geometry"),
     ("form_factor", "error geometry mesh scene"),
-    ("solver", "error form_factor geometry linear mesh progress scene visibility"),
+    ("solver", "error form_factor geometry linear mesh progress scene visibility whole_file"),
     ("vertex", "error form_factor geometry mesh scene"),
     (
         "gather",
@@ -55,7 +56,7 @@ const MAY_KNOW: &[(&str, &str)] = &[
         "kept_mesh",
         "backend bake error gather mesh path_correction progress scene vertex visibility",
     ),
-    ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor"),
+    ("io", "bands camera error gather geometry light_map mesh scene vertex view_factor whole_file"),
 ];
 
 /// Files below `folder`, the program's left out: it is a user of the library.

@@ -2,11 +2,11 @@
 
 use std::borrow::Cow;
 use std::fmt::{self, Debug, Formatter};
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, ErrorKind};
+use crate::whole_file;
 
 /// Where a file is written: a path, or any writer, such as a vector of bytes.
 ///
@@ -65,24 +65,27 @@ impl Output<'_> {
         }
     }
 
-    /// Creates the file and passes it to `write`; any failure names it.
-    pub(super) fn write(
+    /// Passes the file to `write`, or the writer. A file is written beside its path and renamed once
+    /// the disk has all of it: any failure leaves the one that was there.
+    ///
+    /// # Errors
+    /// [`ErrorKind::File`], which names it, when it cannot be written.
+    pub fn write(
         mut self,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Error> {
         let written = match &mut self.0 {
-            Target::Path(path) => File::create(path).and_then(|file| {
-                let mut file = BufWriter::new(file);
-                write(&mut file)?;
-                file.flush()
-            }),
+            Target::Path(path) => whole_file::replace(path, write),
             Target::Writer(writer) => write(writer).and_then(|()| writer.flush()),
         };
         written.map_err(|e| self.cannot_write(e))
     }
 
-    /// Writes all `bytes`.
-    pub(super) fn write_bytes(self, bytes: &[u8]) -> Result<(), Error> {
+    /// Writes all `bytes`: [`Output::write`].
+    ///
+    /// # Errors
+    /// Those of [`Output::write`].
+    pub fn write_bytes(self, bytes: &[u8]) -> Result<(), Error> {
         self.write(|out| out.write_all(bytes))
     }
 

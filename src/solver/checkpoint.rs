@@ -24,6 +24,7 @@ use super::{SolveSession, Solver};
 use crate::error::{Error, ErrorKind};
 use crate::form_factor::FormFactors;
 use crate::mesh::Mesh;
+use crate::whole_file;
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radiosi\x02";
@@ -50,11 +51,9 @@ impl SolveSession<'_> {
     /// [`ErrorKind::File`] when the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
-        let mut temporary = path.as_os_str().to_owned();
-        temporary.push(".new");
-        let written = fs::write(&temporary, self.to_bytes());
         let remedy = "choose a folder that can be written to and has room";
-        written.and_then(|()| fs::rename(&temporary, path)).map_err(file_error(path, remedy))
+        let written = whole_file::replace(path, |out| out.write_all(&self.to_bytes()));
+        written.map_err(file_error(path, remedy))
     }
 
     /// The bytes that [`SolveSession::save`] writes.

@@ -1,10 +1,11 @@
 //! Where `--out` puts files, and what is said of them.
 
 use std::path::Path;
+use std::process::{Command, Output};
 
 use radiosity::glam::DVec3;
 
-use crate::{lit_plates, refused, run, texts, write};
+use crate::{cornell, lit_plates, refused, run, texts, write};
 
 /// Runs a quick `command` on the scene of two plates in `folder`, with this `--out`; gives the
 /// files that it says it wrote.
@@ -88,4 +89,80 @@ fn a_kept_mesh_has_the_vertices_of_the_file_in_their_order() {
     // Both sides of either triangle are lit; the file has the front of each.
     assert_eq!((report["elements"].as_u64(), ply.faces.len()), (Some(4), 2));
     refused(&["x.obj", "--keep-mesh", "--time", "3"], &["cannot be used with"]);
+}
+
+/// Bakes coarsely to this stem, with the environment as `change` makes it.
+#[cfg(unix)]
+fn coarse_bake(stem: &Path, element_size: u32, change: impl Fn(&mut Command)) -> Output {
+    let size = format!("solve.element_size={element_size}");
+    let mut program = Command::new("sh");
+    program.args(["-c", "trap '' XFSZ; ulimit -f \"$LIMIT\"; exec \"$@\"", "sh"]);
+    program.arg(env!("CARGO_BIN_EXE_radiosity"));
+    program.args(["bake", cornell(), "--cpu", "--gather", "none", "--image", "32,32"]);
+    program.args(["--set", &size, "--out", stem.to_str().unwrap()]).env("LIMIT", "unlimited");
+    change(&mut program);
+    program.output().expect("the program starts")
+}
+
+#[cfg(unix)]
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entry = |entry: std::io::Result<std::fs::DirEntry>| {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        path.is_file().then(|| (name, std::fs::read(path).unwrap()))
+    };
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().filter_map(entry).collect();
+    files.sort();
+    files
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_written_is_elsewhere_and_the_rest_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let temporary = folder.path().join("tmp");
+    for name in ["tmp", "box.ply"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    let stem = folder.path().join("box");
+    let out = coarse_bake(&stem, 300, |program| _ = program.env("TMPDIR", &temporary));
+    let [said, error] = texts(&out);
+    assert_eq!(out.status.code(), Some(1), "{error}");
+    let last = error.lines().last().unwrap();
+    assert!(last.contains("box.ply") && last.contains("it is in"), "{error}");
+    let elsewhere = last.rsplit("it is in ").next().unwrap();
+    assert!(std::fs::read(elsewhere).unwrap().starts_with(b"ply"));
+    assert!(Path::new(elsewhere).starts_with(&temporary));
+    assert!(said.contains("box.glb") && !said.contains("box.ply"), "{said}");
+    let files = contents(folder.path());
+    let names: Vec<&str> = files.iter().map(|(name, _)| &**name).collect();
+    assert_eq!(names, ["box.exr", "box.glb", "box.json", "box.png"]);
+    // The report names the other files of its set.
+    let report: serde_json::Value = serde_json::from_slice(&files[2].1).unwrap();
+    let listed = report["files"].as_array().unwrap();
+    assert_eq!(listed.len(), 3);
+    for file in listed {
+        let (_, bytes) = files.iter().find(|(name, _)| file["name"] == **name).unwrap();
+        assert_eq!(file["bytes"], bytes.len());
+        assert_eq!(file["xxh3"], format!("{:016x}", xxhash_rust::xxh3::xxh3_64(bytes)));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_the_files_that_were_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("box");
+    let first = coarse_bake(&stem, 300, |_| ());
+    assert!(matches!(first.status.code(), Some(0 | 3)), "{}", texts(&first)[1]);
+    let old = contents(folder.path());
+    assert_eq!(old.len(), 5);
+    // No file may be larger than a block or two.
+    let out = coarse_bake(&stem, 100, |program| _ = program.env("LIMIT", "1"));
+    let [_, error] = texts(&out);
+    assert_eq!(out.status.code(), Some(1), "{error}");
+    for (name, _) in &old {
+        assert!(error.lines().any(|line| line.contains(name)), "{name}: {error}");
+    }
+    assert!(contents(folder.path()) == old);
 }

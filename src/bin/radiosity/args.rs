@@ -8,7 +8,7 @@ use clap::Args;
 use clap::error::ErrorKind as Usage;
 use radiosity::accuracy::Measure;
 use radiosity::backend::AdapterKind;
-use radiosity::{Backend, Error, ErrorKind, Rgb};
+use radiosity::{Backend, Error, ErrorKind, Rgb, io};
 
 use crate::{interrupt, progress};
 
@@ -177,12 +177,9 @@ impl Output {
         self.stem.with_added_extension(ending)
     }
 
-    /// Writes the file with this ending.
-    ///
-    /// # Errors
-    /// Those of [`write_file`].
-    pub fn write(&self, ending: &str, bytes: &[u8]) -> Result<(), Error> {
-        progress::of_writing(&self.path(ending), |path| write_file(path, bytes))
+    /// Writes the file with this ending: [`write_file`].
+    pub fn write(&self, ending: &str, bytes: &[u8]) {
+        write_file(&self.path(ending), bytes);
     }
 }
 
@@ -299,14 +296,7 @@ pub fn csv(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
     table.into_inner().expect("a vector takes all bytes")
 }
 
-/// Writes a file; errors name it.
-///
-/// # Errors
-/// [`ErrorKind::File`] when that fails.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    std::fs::write(path, bytes).map_err(|e| {
-        let remedy = "choose a folder that exists, can be written and has room";
-        let found = format!("cannot be written: {e}");
-        Error::new(ErrorKind::File, path.display().to_string(), found, remedy).with_source(e)
-    })
+/// Writes a file: [`progress::of_writing`].
+pub fn write_file(path: &Path, bytes: &[u8]) {
+    progress::of_writing(path, |path| io::Output::from(path).write_bytes(bytes));
 }

@@ -198,7 +198,7 @@ impl Bake {
             bands: band_light,
             baked,
         };
-        self.files.write_report(&report.to_json())?;
+        self.files.write_report(report.to_json());
         Ok(report)
     }
 

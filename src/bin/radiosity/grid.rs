@@ -229,7 +229,8 @@ impl Options {
             let picture = self.picture(measured, &statistics, place);
             self.write_picture(&picture, &number)?;
         }
-        self.output.write("grid.csv", &table::csv(measured, self.quantity()))
+        self.output.write("grid.csv", &table::csv(measured, self.quantity()));
+        Ok(())
     }
 
     fn picture<'a>(
@@ -263,7 +264,8 @@ impl Options {
         let png = picture.png().map_err(|found| {
             Error::new(ErrorKind::File, "the picture of a grid", found, "please report it")
         })?;
-        self.output.write(&format!("grid{number}.png"), &png)
+        self.output.write(&format!("grid{number}.png"), &png);
+        Ok(())
     }
 
     fn line(&self, name: &str, measured: &MeasuredGrid, statistics: &GridStatistics) -> String {

@@ -100,7 +100,7 @@ impl Options {
         let balance = balance.ok_or(Stop::Interrupted)?;
         self.print_powers(&matrix, &balance);
         print_groups(&matrix, &balance);
-        progress::of_writing(&out, |path| self.write(path, &matrix, &balance))?;
+        self.write(&out, &matrix, &balance);
         Ok(())
     }
 
@@ -166,7 +166,7 @@ impl Options {
     }
 
     /// Writes a line a group.
-    fn write(&self, path: &Path, matrix: &ViewFactors, balance: &HeatBalance) -> Result<(), Error> {
+    fn write(&self, path: &Path, matrix: &ViewFactors, balance: &HeatBalance) {
         let head = "group,area,temperature,radiosity,irradiance,net_flux,standard_error";
         let head = if self.unit.is_some() { format!("{head},power") } else { head.into() };
         let square = self.unit.map_or(1.0, |metres| metres * metres);
@@ -180,7 +180,7 @@ impl Options {
             let numbers = numbers.into_iter().chain(power).map(|number| number.to_string());
             start.into_iter().chain(numbers).collect()
         });
-        args::write_file(path, &args::csv(&head, lines))
+        args::write_file(path, &args::csv(&head, lines));
     }
 }
 

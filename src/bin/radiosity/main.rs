@@ -14,7 +14,7 @@
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
-//! error. Exit status: 0 when all was done, 1 when the work failed, 2 for wrong usage, 3 when
+//! error. Exit status: 0 when all was done, 1 when the work failed or a file was not written, 2 for wrong usage, 3 when
 //! results are written whose error is larger than what was asked for, 130 when Ctrl-C stopped it.
 
 // The same bytes on every platform: see clippy.toml.
@@ -53,6 +53,7 @@ mod viewer_options;
 
 use std::process::ExitCode;
 
+use args::Stop;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use view_factors::merge;
 
@@ -101,7 +102,9 @@ fn main() -> ExitCode {
         Command::TradeOff(options) => options.run(),
         Command::Verify(options) => options.run(),
     };
+    let unwritten = progress::report_unwritten();
     match done {
+        Ok(()) | Err(Stop::Missed | Stop::Interrupted) if unwritten => ExitCode::FAILURE,
         Ok(()) => ExitCode::SUCCESS,
         Err(stop) => stop.report(program.find_subcommand_mut(name).expect("it was run")),
     }

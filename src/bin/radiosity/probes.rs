@@ -66,8 +66,8 @@ impl Options {
         let inside = probes.iter().filter(|probe| probe.is_inside()).count();
         let [x, y, z] = grid.counts;
         say!("{} probes, {x} by {y} by {z}, {inside} of them inside of something", probes.len());
-        self.output.write("probes.json", &json(&grid, &probes))?;
-        self.output.write("probes.csv", &csv(&probes))?;
+        self.output.write("probes.json", &json(&grid, &probes));
+        self.output.write("probes.csv", &csv(&probes));
         progress::print_written();
         self.light.print_outcome(is_reached);
         args::end_at(is_reached)

@@ -16,17 +16,19 @@
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use radiosity::Solver;
 use radiosity::bake::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
+use radiosity::{Error, Solver};
+use serde_json::{Value, json};
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::interrupt;
 
@@ -84,20 +86,73 @@ pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
     of_stage(&format!("reading {}", path.display()), work)
 }
 
-/// Runs `work`, which writes this file, with that shown.
-pub fn of_writing<T, E>(path: &Path, work: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, E> {
-    let done = of_stage(&format!("writing {}", path.display()), || work(path))?;
-    locked(&WRITTEN).push(path.display().to_string());
-    Ok(done)
+/// Runs `work`, which writes this file, with that shown. If it cannot be written there, it is in the
+/// system's folder for temporary files; none if that fails too. Other files are written
+/// nevertheless, and [`report_unwritten`] says at the end which were not.
+pub fn of_writing<T>(path: &Path, work: impl Fn(&Path) -> Result<T, Error>) -> Option<T> {
+    let stage = format!("writing {}", path.display());
+    let (error, done) = match of_stage(&stage, || work(path)) {
+        Ok(done) => {
+            locked(&WRITTEN).push(path.into());
+            return Some(done);
+        }
+        Err(error) => (error, elsewhere(path).ok()),
+    };
+    let done = done.and_then(|other| match work(&other) {
+        Ok(done) => Some((done, other)),
+        Err(_) => {
+            // Its folder goes where nothing else is in it.
+            _ = other.parent().map(std::fs::remove_dir);
+            None
+        }
+    });
+    let place = match &done {
+        Some((_, other)) => format!("; it is in {}", other.display()),
+        None => String::new(),
+    };
+    locked(&UNWRITTEN).push(format!("{error}{place}"));
+    done.map(|(done, _)| done)
+}
+
+/// A path for the file of this `path` in the system's folder for temporary files.
+fn elsewhere(path: &Path) -> std::io::Result<PathBuf> {
+    let folder = std::env::temp_dir().join(format!("radiosity-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    Ok(folder.join(path.file_name().unwrap_or_default()))
 }
 
 /// The files that were written.
-static WRITTEN: Mutex<Vec<String>> = Mutex::new(vec![]);
+static WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(vec![]);
+
+/// What is said of those that were not.
+static UNWRITTEN: Mutex<Vec<String>> = Mutex::new(vec![]);
+
+/// Says which files could not be written, if any.
+pub fn report_unwritten() -> bool {
+    let unwritten = locked(&UNWRITTEN);
+    unwritten.iter().for_each(|error| eprintln!("error: {error}"));
+    !unwritten.is_empty()
+}
+
+/// The files that were written, each with its size and the XXH3-64 of its bytes, as JSON.
+pub fn written_files() -> Value {
+    let file = |path: &PathBuf| {
+        let bytes = std::fs::read(path).ok()?;
+        let name = path.file_name()?.to_string_lossy();
+        Some(json!({
+            "name": name,
+            "bytes": bytes.len(),
+            "xxh3": format!("{:016x}", xxh3_64(&bytes)),
+        }))
+    };
+    locked(&WRITTEN).iter().filter_map(file).collect()
+}
 
 /// A line of the files that were written, if there are any.
 pub fn written() -> Option<String> {
     let files = locked(&WRITTEN);
-    (!files.is_empty()).then(|| format!("wrote      {}", files.join(", ")))
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    (!names.is_empty()).then(|| format!("wrote      {}", names.join(", ")))
 }
 
 /// Prints that line.

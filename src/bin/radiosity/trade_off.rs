@@ -98,7 +98,7 @@ impl Options {
         let results = self.results(Arc::new(scene))?;
         if !results.runs.is_empty() {
             say!("{}", results.text());
-            self.output.write("csv", &results.csv())?;
+            self.output.write("csv", &results.csv());
         }
         if interrupt::stopped() {
             eprintln!("stopped: the table has the runs that were finished; there is no chart");
@@ -107,7 +107,7 @@ impl Options {
                 let remedy = "the table of all runs has been written";
                 Error::new(ErrorKind::File, "the chart", found, remedy)
             };
-            self.output.write("png", &results.png().map_err(bad)?)?;
+            self.output.write("png", &results.png().map_err(bad)?);
         }
         progress::print_written();
         args::end()

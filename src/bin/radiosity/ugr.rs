@@ -57,7 +57,7 @@ impl Options {
             rows.extend(glare.sources.iter().map(|source| row(k, source)));
         }
         let head = "observer,source,luminance,solid_angle,position_index,term,x,y,z";
-        self.output.write("ugr.csv", &args::csv(head, rows))?;
+        self.output.write("ugr.csv", &args::csv(head, rows));
         progress::print_written();
         args::end()
     }

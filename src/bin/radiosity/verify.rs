@@ -96,7 +96,7 @@ impl Options {
                 let traced = points.trace(&scene, self.paths.get(), self.seed, json)?;
                 say!("{}", traced.summary());
                 if let Some(file) = &self.csv {
-                    args::write_file(file, &traced.csv())?;
+                    args::write_file(file, &traced.csv());
                 }
             }
             (None, Some(ply)) => self.verify(&scene, &luminaires, ply)?,
@@ -135,11 +135,12 @@ impl Options {
             say!("{verdict}");
         }
         if let Some(file) = &self.csv {
-            args::write_file(file, &csv(&lines))?;
+            args::write_file(file, &csv(&lines));
         }
-        self.points_ply
-            .iter()
-            .try_for_each(|file| args::write_file(file, points::coloured_ply(&found).as_bytes()))
+        if let Some(file) = &self.points_ply {
+            args::write_file(file, points::coloured_ply(&found).as_bytes());
+        }
+        Ok(())
     }
 
     /// How it ended, and what deserves a look.

@@ -192,7 +192,7 @@ fn write_all(formats: &[files::Format], stem: &Path, matrix: &ViewFactors) -> Re
         report::print_factors(matrix);
     }
     for format in formats {
-        progress::of_writing(&format.path(stem), |_| format.write(stem, matrix))?;
+        progress::of_writing(&format.path(stem), |path| format.write(path, matrix));
     }
     Ok(())
 }

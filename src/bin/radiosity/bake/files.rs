@@ -149,51 +149,44 @@ impl Files {
                 eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
             }
             let tone = self.viewer.of_picture(&seen);
-            self.write_picture("", &seen, &tone)?;
+            self.write_picture("", &seen, &tone);
             picture = Some(Picture { camera, exposure: tone.exposure() });
             image = Some(seen);
         }
         // Where the picture is black, what it does not show has its own exposure.
         let tone = self.viewer.of_meshes(image.as_ref(), baked);
-        self.write_meshes(baked, &tone)?;
+        self.write_meshes(baked, &tone);
         Ok(picture)
     }
 
     /// Writes a picture to files whose endings begin with `of`.
-    fn write_picture(
-        &self,
-        of: &str,
-        image: &RadianceImage,
-        tone: &ToneCurve,
-    ) -> Result<(), Error> {
+    fn write_picture(&self, of: &str, image: &RadianceImage, tone: &ToneCurve) {
         let path = |ending| self.output.path(&format!("{of}{ending}"));
         if self.writes(Format::Exr) {
-            progress::of_writing(&path("exr"), |path| write_exr(path, image))?;
+            progress::of_writing(&path("exr"), |path| write_exr(path, image));
         }
         if self.writes(Format::Png) {
-            progress::of_writing(&path("png"), |path| write_png_with_tone(path, image, tone))?;
+            progress::of_writing(&path("png"), |path| write_png_with_tone(path, image, tone));
         }
-        Ok(())
     }
 
     /// Writes meshes; their colours are those of the picture.
-    fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) -> Result<(), Error> {
+    fn write_meshes(&self, baked: &BakeResult, tone: &ToneCurve) {
         if self.writes(Format::Ply) {
             let mut surface = self.surface(baked);
             surface.comments = comments(baked);
             let write = |path: &Path| write_ply_with_tone(path, &surface, tone);
-            progress::of_writing(&self.output.path("ply"), write)?;
+            progress::of_writing(&self.output.path("ply"), write);
         }
         if self.writes(Format::Glb) {
-            self.write_glb(baked, &glb_settings(tone, self.metres, baked))?;
+            self.write_glb(baked, &glb_settings(tone, self.metres, baked));
         }
         if self.elements {
             progress::of_writing(&self.output.path("elements.ply"), |path| {
                 let flat = VertexMesh::per_element(&baked.mesh, &baked.solution.radiosity);
                 write_ply_with_tone(path, &flat, tone)
-            })?;
+            });
         }
-        Ok(())
     }
 
     /// The mesh of a PLY file: with the vertices of the scene's file where its mesh is kept.
@@ -212,15 +205,16 @@ impl Files {
     }
 
     /// Writes the glTF file of the scene with its light, or the mesh of the light.
-    fn write_glb(&self, baked: &BakeResult, settings: &GlbSettings) -> Result<(), Error> {
+    fn write_glb(&self, baked: &BakeResult, settings: &GlbSettings) {
         let Some(source) = self.source.as_ref().filter(|_| !self.refine) else {
             let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
-            return progress::of_writing(&self.output.path("glb"), write);
+            progress::of_writing(&self.output.path("glb"), write);
+            return;
         };
         let Source { path, ending, scene } = source;
         let write =
             |to: &Path| write_lit_gltf(to, path, &baked.light, scene.as_deref(), settings.clone());
-        let counts = progress::of_writing(&self.output.path(ending), write)?;
+        let Some(counts) = progress::of_writing(&self.output.path(ending), write) else { return };
         let LitVertices { without, instances, .. } = counts;
         if without > 0 {
             eprintln!("warning: {without} vertices are of no lit triangle: black in the glTF file");
@@ -231,7 +225,6 @@ impl Files {
                  glTF file: --refine writes a mesh for each"
             );
         }
-        Ok(())
     }
 
     /// Writes the light of bands and, if they have colours, a picture of these: from the camera of
@@ -249,27 +242,27 @@ impl Files {
             coloured.surface = colours;
             let image = self.interpolated(&camera, &coloured)?;
             let shown = tone.unwrap_or_else(|| ToneCurve::fit_image(&image));
-            self.write_picture("bands.", &image, &shown)?;
+            self.write_picture("bands.", &image, &shown);
             tone = Some(shown);
         }
         if self.writes(Format::Ply) {
             let tone = tone.map(ToneCurve::of_radiosity);
             progress::of_writing(&self.output.path("bands.ply"), |path| {
                 write_ply_bands(path, light, tone.as_ref())
-            })?;
+            });
         }
         if self.writes(Format::Csv) {
-            self.output.write("bands.csv", &bands::table(light))?;
+            self.output.write("bands.csv", &bands::table(light));
         }
         Ok(())
     }
 
-    /// Writes the report.
-    pub fn write_report(&self, json: &serde_json::Value) -> Result<(), Error> {
-        if !self.writes(Format::Json) {
-            return Ok(());
+    /// Writes the report, with the names of all files before it.
+    pub fn write_report(&self, mut json: serde_json::Value) {
+        if self.writes(Format::Json) {
+            json["files"] = progress::written_files();
+            self.output.write("json", format!("{json:#}\n").as_bytes());
         }
-        self.output.write("json", format!("{json:#}\n").as_bytes())
     }
 
     /// The picture, interpolated between vertices or gathered by its pixels.

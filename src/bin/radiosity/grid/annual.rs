@@ -112,7 +112,8 @@ fn write(options: &Options, grids: &[AnnualGrid]) -> Result<(), Error> {
         let number = if grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
         options.write_picture(&annual.picture(options), &number)?;
     }
-    options.output.write("grid.csv", &table(grids))
+    options.output.write("grid.csv", &table(grids));
+    Ok(())
 }
 
 impl AnnualGrid<'_> {

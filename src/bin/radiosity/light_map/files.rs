@@ -110,30 +110,30 @@ impl Options {
         for (k, name) in page_names(&map.atlas).iter().enumerate() {
             let (page, path) = (map.page(k), |ending: &str| path(&format!("{name}{ending}")));
             let write = |ending: &str, write: &dyn Fn(&Path, MapPage) -> Result<(), Error>| {
-                progress::of_writing(&path(ending), |path| write(path, page))
+                progress::of_writing(&path(ending), |path| write(path, page));
             };
             if writes(Format::Exr) {
-                write("exr", &|path, page| write_light_map_exr(path, page))?;
+                write("exr", &|path, page| write_light_map_exr(path, page));
             }
             if self.radiosity {
-                write("radiosity.exr", &|path, page| write_light_map_radiosity(path, page))?;
+                write("radiosity.exr", &|path, page| write_light_map_radiosity(path, page));
             }
             if let Some(changes) = directional {
                 let directional =
                     |path: &Path, page: MapPage| write_light_map_directional(path, page, changes);
-                write("directional.exr", &directional)?;
+                write("directional.exr", &directional);
             }
             if writes(Format::Ktx2) {
-                write("ktx2", &|path, page| write_light_map_ktx2(path, page))?;
+                write("ktx2", &|path, page| write_light_map_ktx2(path, page));
             }
             if writes(Format::Rgbm) {
-                write("rgbm.png", &|path, page| write_light_map_rgbm(path, page, range))?;
+                write("rgbm.png", &|path, page| write_light_map_rgbm(path, page, range));
             }
         }
         // The range of RGBM is in the report.
         if writes(Format::Json) || writes(Format::Rgbm) {
             let report = self.report(map, baked, shown);
-            self.output.write("json", format!("{report:#}\n").as_bytes())?;
+            self.output.write("json", format!("{report:#}\n").as_bytes());
         }
         if !writes(Format::Glb) && !writes(Format::Ply) && !writes(Format::Png) {
             return Ok(());
@@ -147,7 +147,7 @@ impl Options {
                 }
                 None => {
                     let write = |path: &Path| write_light_map_glb(path, map, settings.clone());
-                    progress::of_writing(&path("glb"), write)?;
+                    progress::of_writing(&path("glb"), write);
                 }
             }
         }
@@ -156,14 +156,14 @@ impl Options {
         }
         let surface = progress::of_stage("cutting the scene to texels", || map.surface())?;
         if writes(Format::Ply) {
-            progress::of_writing(&path("ply"), |path| write_ply_with_tone(path, &surface, &tone))?;
+            progress::of_writing(&path("ply"), |path| write_ply_with_tone(path, &surface, &tone));
         }
         if writes(Format::Png) {
             let [width, height] = PICTURE;
             let image =
                 self.camera.of(&baked.light, PICTURE).image(&surface, width, height, SAMPLES)?;
             let tone = self.viewer.of_picture(&image);
-            progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone))?;
+            progress::of_writing(&path("png"), |path| write_png_with_tone(path, &image, &tone));
         }
         Ok(())
     }
@@ -207,7 +207,7 @@ impl Options {
         let write = |path: &Path| {
             write_mapped_gltf(path, &self.scene, map, scene, (binding, &files), settings.clone())
         };
-        let instances = progress::of_writing(to, write)?;
+        let instances = progress::of_writing(to, write).unwrap_or(0);
         if instances > 0 {
             eprintln!(
                 "warning: {instances} instances share their vertices, and have no places in the \

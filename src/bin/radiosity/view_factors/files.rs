@@ -1,13 +1,12 @@
 //! The formats that a matrix of view factors is written in.
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use npyz::WriterBuilder;
 use radiosity::io::view_factors::{write_csv_list, write_csv_matrix, write_matrix_market};
-use radiosity::io::write_npz;
+use radiosity::io::{Output, write_npz};
 use radiosity::view_factor::Estimate;
 use radiosity::{Error, ErrorKind, ViewFactors};
 
@@ -97,28 +96,21 @@ impl Format {
         }
     }
 
-    pub fn write(self, stem: &Path, matrix: &ViewFactors) -> Result<(), Error> {
-        let path = self.path(stem);
+    pub fn write(self, path: &Path, matrix: &ViewFactors) -> Result<(), Error> {
         match self {
             Format::Csv => write_csv_matrix(path, matrix),
             Format::List => write_csv_list(path, matrix),
             Format::MatrixMarket => write_matrix_market(path, matrix),
-            Format::Npy => write_npy(&path, matrix).map_err(|e| not_written(&path, &e)),
+            Format::Npy => Output::from(path).write(|out| write_npy(out, matrix)),
             Format::Npz => write_npz(path, matrix),
         }
     }
 }
 
-fn not_written(path: &Path, error: &std::io::Error) -> Error {
-    let place = path.display().to_string();
-    Error::new(ErrorKind::File, place, error.to_string(), "it must be writable")
-}
-
-fn write_npy(path: &Path, matrix: &ViewFactors) -> std::io::Result<()> {
+fn write_npy(out: &mut dyn Write, matrix: &ViewFactors) -> std::io::Result<()> {
     let n = matrix.names.len();
-    let file = BufWriter::new(File::create(path)?);
     let options = npyz::WriteOptions::new().default_dtype().shape(&[n as u64, n as u64]);
-    let mut writer = options.writer(file).begin_nd()?;
+    let mut writer = options.writer(out).begin_nd()?;
     for from in 0..n {
         for to in 0..n {
             let Estimate { value, error } = matrix.factor(from, to);

@@ -38,7 +38,7 @@ impl ToError {
         let path = stem.with_added_extension(format!("{}-{}.rows", rows.start, rows.end));
         args::check_writable(&path)?;
         let part = self.rows(scene, rows)?;
-        progress::of_writing(&path, |path| write_rows(path, &part))?;
+        progress::of_writing(&path, |path| write_rows(path, &part));
         say!("{}: rows of {} groups are missing", path.display(), part.missing().len());
         Ok(())
     }
