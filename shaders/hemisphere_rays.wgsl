@@ -12,7 +12,8 @@ fn hemisphere_rays(
 ) {
     let p = work.points[group.x];
     let point = points[p];
-    let state = vec4u(states[p].ray_count, states[p].pending, states[p].light_count, wide_lights(p));
+    let state =
+        vec4u(states[p].ray_count, states[p].pending, states[p].light_count, wide_lights(p));
     let known = uniform_of(lane, state);
     let rays = rays_of_pass(known.x, known.y);
     let light_count = known.z;

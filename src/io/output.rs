@@ -65,8 +65,8 @@ impl Output<'_> {
         }
     }
 
-    /// Passes the file to `write`, or the writer. A file is written beside its path and renamed once
-    /// the disk has all of it: any failure leaves the one that was there.
+    /// Passes the file to `write`, or the writer. A file is written beside its path, and renamed
+    /// once the disk has all of it: any failure leaves the one that was there.
     ///
     /// # Errors
     /// [`ErrorKind::File`], which names it, when it cannot be written.

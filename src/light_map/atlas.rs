@@ -98,7 +98,8 @@ impl Atlas {
             Atlas::with_settings(scene.clone(), &LayoutSettings { resolution, ..*settings })
         };
         let mut sizes = (6..11).map(|doublings| of(1 << doublings));
-        let fits = |atlas: &Result<Atlas, Error>| !matches!(atlas, Err(e) if e.kind() == ErrorKind::Setting);
+        let has_no_room = |e: &Error| e.kind() == ErrorKind::Setting;
+        let fits = |atlas: &Result<Atlas, Error>| !atlas.as_ref().is_err_and(has_no_room);
         sizes.find(fits).unwrap_or_else(|| of(2048))
     }
 

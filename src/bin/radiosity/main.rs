@@ -14,8 +14,9 @@
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
-//! error. Exit status: 0 when all was done, 1 when the work failed or a file was not written, 2 for wrong usage, 3 when
-//! results are written whose error is larger than what was asked for, 130 when Ctrl-C stopped it.
+//! error. Exit status: 0 when all was done, 1 when the work failed or a file was not written, 2 for
+//! wrong usage, 3 when results are written whose error is larger than what was asked for, 130 when
+//! Ctrl-C stopped it.
 
 // The same bytes on every platform: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]

@@ -86,9 +86,9 @@ pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
     of_stage(&format!("reading {}", path.display()), work)
 }
 
-/// Runs `work`, which writes this file, with that shown. If it cannot be written there, it is in the
-/// system's folder for temporary files; none if that fails too. Other files are written
-/// nevertheless, and [`report_unwritten`] says at the end which were not.
+/// Runs `work`, which writes this file, with that shown. If it cannot be written there, it is
+/// written to the system's folder for temporary files; none if that fails too. Other files are
+/// written nevertheless, and [`report_unwritten`] says at the end which were not.
 pub fn of_writing<T>(path: &Path, work: impl Fn(&Path) -> Result<T, Error>) -> Option<T> {
     let stage = format!("writing {}", path.display());
     let (error, done) = match of_stage(&stage, || work(path)) {
