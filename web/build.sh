@@ -5,10 +5,11 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 [ -d node_modules ] || npm ci --silent
+target=${CARGO_TARGET_DIR:-../target}
 cargo build --locked --release --target wasm32-unknown-unknown -p radiosity-web \
     --config 'target.wasm32-unknown-unknown.rustflags=["-C", "target-feature=+simd128"]'
 cargo run --locked --release --quiet -p radiosity-web-bindgen -- \
-    ../target/wasm32-unknown-unknown/release/radiosity_web.wasm pkg
+    "$target/wasm32-unknown-unknown/release/radiosity_web.wasm" pkg
 
 rm -rf dist
 mkdir dist
