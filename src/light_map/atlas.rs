@@ -92,7 +92,8 @@ impl Atlas {
         scene: impl Into<Arc<Scene>>,
         settings: &LayoutSettings,
     ) -> Result<Atlas, Error> {
-        let scene = scene.into();
+        // Once for all sizes.
+        let scene = lit_sides::resolved(scene.into());
         let of = |pixels: u32| {
             let resolution = Resolution::Pixels(pixels);
             Atlas::with_settings(scene.clone(), &LayoutSettings { resolution, ..*settings })

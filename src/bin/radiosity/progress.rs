@@ -15,6 +15,8 @@
 //! The seconds between lines go on from stage to stage, so that many short ones are no silence.
 
 use std::cell::Cell;
+use std::fs::File;
+use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -26,9 +28,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::bake::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
-use radiosity::{Error, Solver};
+use radiosity::{Error, ErrorKind, Solver};
 use serde_json::{Value, json};
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::Xxh3;
 
 use crate::interrupt;
 
@@ -91,14 +93,16 @@ pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
 /// written nevertheless, and [`report_unwritten`] says at the end which were not.
 pub fn of_writing<T>(path: &Path, work: impl Fn(&Path) -> Result<T, Error>) -> Option<T> {
     let stage = format!("writing {}", path.display());
-    let (error, done) = match of_stage(&stage, || work(path)) {
+    let error = match of_stage(&stage, || work(path)) {
         Ok(done) => {
             locked(&WRITTEN).push(path.into());
             return Some(done);
         }
-        Err(error) => (error, elsewhere(path).ok()),
+        Err(error) => error,
     };
-    let done = done.and_then(|other| match work(&other) {
+    // What no file can hold is not tried again.
+    let other = if error.kind() == ErrorKind::File { elsewhere(path).ok() } else { None };
+    let done = other.and_then(|other| match work(&other) {
         Ok(done) => Some((done, other)),
         Err(_) => {
             // Its folder goes where nothing else is in it.
@@ -137,15 +141,27 @@ pub fn report_unwritten() -> bool {
 /// The files that were written, each with its size and the XXH3-64 of its bytes, as JSON.
 pub fn written_files() -> Value {
     let file = |path: &PathBuf| {
-        let bytes = std::fs::read(path).ok()?;
+        let (bytes, hash) = size_and_hash(path).ok()?;
         let name = path.file_name()?.to_string_lossy();
-        Some(json!({
-            "name": name,
-            "bytes": bytes.len(),
-            "xxh3": format!("{:016x}", xxh3_64(&bytes)),
-        }))
+        Some(json!({ "name": name, "bytes": bytes, "xxh3": format!("{hash:016x}") }))
     };
-    locked(&WRITTEN).iter().filter_map(file).collect()
+    // Pipes have no content to be read again.
+    locked(&WRITTEN).iter().filter(|path| path.is_file()).filter_map(file).collect()
+}
+
+/// The number of bytes of a file, and their XXH3-64: piece by piece, since a file can be large.
+fn size_and_hash(path: &Path) -> std::io::Result<(u64, u64)> {
+    let (mut file, mut hash) = (File::open(path)?, Xxh3::new());
+    let (mut buffer, mut size) = (vec![0; 1 << 16], 0);
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok((size, hash.digest())),
+            count => {
+                hash.update(&buffer[..count]);
+                size += count as u64;
+            }
+        }
+    }
 }
 
 /// A line of the files that were written, if there are any.
