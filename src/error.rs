@@ -5,23 +5,40 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 /// An error with its place, finding and remedy.
 ///
 /// Shown with `{}`, it is one line: `place: found; remedy`.
-#[derive(Clone)]
+/// From another process it has no source.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(from = "Inner", into = "Inner")]
 pub struct Error(Arc<Inner>);
 
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 struct Inner {
     kind: ErrorKind,
     place: String,
     found: String,
     remedy: String,
+    #[serde(skip)]
     source: Option<Arc<dyn std::error::Error + Send + Sync>>,
 }
 
+impl From<Inner> for Error {
+    fn from(inner: Inner) -> Error {
+        Error(Arc::new(inner))
+    }
+}
+
+impl From<Error> for Inner {
+    fn from(error: Error) -> Inner {
+        Arc::unwrap_or_clone(error.0)
+    }
+}
+
 /// The broad class of an [`Error`], for callers that react differently to each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ErrorKind {
     /// A scene that cannot be used: geometry, materials or a malformed file.

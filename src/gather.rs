@@ -42,6 +42,7 @@ pub(crate) mod vertex_weights;
 pub(crate) mod visible;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -67,7 +68,7 @@ pub struct GatherPoint {
 /// What arrives at a [`GatherPoint`].
 ///
 /// All shares are form factors from the point: cosine-weighted and 1 for the whole hemisphere.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct IrradianceSample {
     /// Irradiance, W/m² per channel: Σ F_pj B_j over all fronts that are seen, with B emitted plus
     /// reflected, and the sky where there is no surface.

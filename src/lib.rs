@@ -65,7 +65,7 @@
 //! | [`bands`] | light in any number of bands on the mesh of a bake; spectra to colours |
 //! | [`view_factor`] | area-averaged factors between groups |
 //! | [`heat`] | temperatures and net fluxes of groups, by their view factors |
-//! | [`ranks`] | processes that share out view factors, as those of MPI |
+//! | [`work`] | long work shared by processes, as those of MPI, and kept in a journal |
 //! | [`light_map`] | irradiance at the texels of a texture |
 //! | [`accuracy`] | the measure of error |
 //! | [`verify`] | how far off a solution is, by path tracing the scene at random points |
@@ -130,7 +130,6 @@ pub mod mesh;
 pub mod path_correction;
 pub mod probe;
 mod progress;
-pub mod ranks;
 mod sampling;
 pub mod scene;
 pub mod solver;
@@ -139,6 +138,7 @@ pub mod vertex;
 pub mod view_factor;
 mod visibility;
 mod whole_file;
+pub mod work;
 
 pub use glam;
 

@@ -20,19 +20,20 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind};
 use crate::gather::{Gather, GatherPoint, GatheredMesh, IrradianceSample};
 use crate::path_correction::{MissingLight, NoisyValue, PathCorrection, correct, numbers_of};
-use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::visibility::{buried, offset};
+use crate::work::{Batches, agree};
 pub use harmonics::Harmonics;
 use harmonics::{COUNT, DIRECTIONS};
 pub use probe_grid::ProbeGrid;
 
 /// Irradiance at a point from all sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     /// Position, scene unit.
     pub position: DVec3,
@@ -102,9 +103,9 @@ pub fn probes_at(
     let near = near(light, size);
     let mut probes = Vec::with_capacity(positions.len());
     let mut remaining = positions;
-    let mut batches = BatchSizer::new(16);
+    let mut batches = Batches::new(16);
     while !remaining.is_empty() {
-        let found = batches.next(&mut remaining, |batch| {
+        let (_, found) = batches.try_next(&mut remaining, |batch| {
             let around = |&position: &DVec3| {
                 DIRECTIONS.iter().map(move |d| GatherPoint { position, normal: d.unit(), near })
             };
@@ -114,7 +115,7 @@ pub fn probes_at(
             Ok::<_, Error>(each.map(|(&p, samples)| Probe::new(p, samples)).collect::<Vec<_>>())
         })?;
         probes.extend(found);
-        if progress(probes.len(), positions.len()).is_break() {
+        if agree(progress(probes.len(), positions.len())).is_break() {
             return Ok(None);
         }
     }

@@ -1,4 +1,4 @@
-//! Long work: reason of its stop, size of its batches, time by stage.
+//! Long work: reason of its stop, time by stage.
 //!
 //! Work that takes more than a second is done in batches. Between batches a progress callback is
 //! called with the state reached; it returns [`ControlFlow<()>`](std::ops::ControlFlow), and a
@@ -11,7 +11,6 @@
 //! ```
 
 use std::fmt;
-use std::time::Duration;
 
 /// The clock of the library: that of the platform, in browsers `performance.now()`.
 pub(crate) use web_time::Instant;
@@ -40,53 +39,6 @@ impl fmt::Display for StopReason {
             StopReason::Elements => "elements",
             StopReason::Cancelled => "cancelled",
         })
-    }
-}
-
-/// Batches grow or shrink towards this duration, so that progress is reported several times a
-/// second.
-const BATCH_DURATION: Duration = Duration::from_millis(250);
-
-/// Splits a list of like items into batches of similar duration. Results must not depend on batch
-/// ends, which follow the clock.
-#[derive(Clone)]
-pub(crate) struct BatchSizer {
-    /// Items in the next batch, and in any but the last at least.
-    size: usize,
-    least: usize,
-}
-
-impl BatchSizer {
-    /// The first batch has `first` items.
-    pub fn new(first: usize) -> BatchSizer {
-        BatchSizer { size: first, least: 1 }
-    }
-
-    /// As many items at least, all but in the last batch: those that are done at once, each by one
-    /// thread.
-    pub fn at_least(self, least: usize) -> BatchSizer {
-        BatchSizer { size: self.size.max(least), least }
-    }
-
-    /// Takes the next batch off the front of `remaining` and returns the result of `work` on it.
-    /// The batch after one that took too long is half as large; after a full one that took less
-    /// than a third of [`BATCH_DURATION`], twice as large.
-    pub fn next<'t, T, R>(
-        &mut self,
-        remaining: &mut &'t [T],
-        work: impl FnOnce(&'t [T]) -> R,
-    ) -> R {
-        let (batch, rest) = remaining.split_at(remaining.len().min(self.size));
-        *remaining = rest;
-        let start = Instant::now();
-        let result = work(batch);
-        let duration = start.elapsed();
-        if duration > BATCH_DURATION {
-            self.size = (self.size / 2).max(self.least);
-        } else if duration < BATCH_DURATION / 3 && batch.len() == self.size {
-            self.size *= 2;
-        }
-        result
     }
 }
 
@@ -135,20 +87,4 @@ pub(crate) fn lap(start: &mut Instant) -> f64 {
     let seconds = start.elapsed().as_secs_f64();
     *start = Instant::now();
     seconds
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn batches_cover_all_items_once_in_order() {
-        let items: Vec<u32> = (0..1000).collect();
-        let (mut remaining, mut done) = (&items[..], vec![]);
-        let mut batches = BatchSizer::new(3);
-        while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| done.extend(batch.iter().copied()));
-        }
-        assert_eq!(done, items);
-    }
 }

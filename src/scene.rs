@@ -13,6 +13,7 @@ mod covers;
 mod cut;
 mod cut_outs;
 mod derived;
+pub(crate) mod fingerprint;
 pub(crate) mod glass_bodies;
 mod half_edge;
 mod intensity;

@@ -27,10 +27,10 @@ use std::ops::ControlFlow;
 pub use crate::accuracy::Estimate;
 use crate::error::{Error, ErrorKind};
 pub use crate::light::{PathTracer, Reflected, SurfacePoint};
-use crate::progress::Instant;
 use crate::scene::Scene;
 use crate::vertex::VertexMesh;
 use crate::visibility::lit_sides::is_resolved;
+use crate::work::now;
 use sampler::Sampler;
 pub use settings::Settings;
 pub(crate) use solution::Solution;
@@ -165,7 +165,7 @@ impl<'a> Verifier<'a> {
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Verification, Error> {
         let (sampler, settings) = (&mut self.sampler, &self.settings);
-        let start = Instant::now();
+        let start = now();
         // A point per 64 vertices: the finer a mesh, the rarer what it misses. Of 26 901 points of
         // a room of half a million vertices, two had 30 % of the squared error.
         self.points = self.points.max(solution.vertices() / 64);
@@ -191,7 +191,7 @@ impl<'a> Verifier<'a> {
             let traced = (sampler.drawn() * self.paths) as u64;
             let stop = if enough && !biased && (is_precise || limits.decided_by(&error)) {
                 Stop::Precise
-            } else if settings.time.is_some_and(|time| 2 * start.elapsed() > time) {
+            } else if settings.time.is_some_and(|time| 2 * (now() - start) > time) {
                 // Another round doubles all that was done so far.
                 break Stop::Time;
             } else if limits.end_at(traced, &error)

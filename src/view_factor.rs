@@ -57,7 +57,6 @@ use self::assembler::Assembler;
 use self::partial_matrix::{Making, Method};
 use self::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind};
-use crate::ranks::{Alone, Ranks};
 use crate::scene::Scene;
 
 pub use self::backs_met::{BackMet, backs_met};
@@ -197,7 +196,7 @@ impl PartialMatrix {
     /// Computes those rows `wanted` that are not in `done`, of the matrix that
     /// [`ViewFactors::new`] makes with these settings, and returns them with those of `done`.
     ///
-    /// `ranks` share the work; [`Alone`](crate::ranks::Alone) is a single process. `progress` is
+    /// `progress` is
     /// called with the rows done, the number of polygons done and their total, and may stop the
     /// work: the rows done so far are returned.
     ///
@@ -210,7 +209,6 @@ impl PartialMatrix {
         two_sided: &[usize],
         wanted: Range<usize>,
         done: Option<PartialMatrix>,
-        ranks: &mut dyn Ranks,
         mut progress: impl FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
     ) -> Result<PartialMatrix, Error> {
         check_settings(scene, error, two_sided)?;
@@ -227,7 +225,7 @@ impl PartialMatrix {
             part.check_fits(&done, "rows that are done")?;
             part = done;
         }
-        Ok(with_rows(part, scene, polygons, error, wanted, ranks, &mut progress).0)
+        Ok(with_rows(part, scene, polygons, error, wanted, &mut progress).0)
     }
 }
 
@@ -245,8 +243,7 @@ fn whole(
     let part = PartialMatrix::none(scene, error, two_sided, method, &polygons);
     let all = 0..polygons.fronts.rows.count();
     let mut told = |_: &PartialMatrix, done, of| progress(done, of);
-    let alone = &mut Alone;
-    let (part, is_done) = with_rows(part, scene, polygons, error, all, alone, &mut told);
+    let (part, is_done) = with_rows(part, scene, polygons, error, all, &mut told);
     Ok(if is_done { part.into_matrix().ok() } else { None })
 }
 
@@ -257,11 +254,10 @@ fn with_rows(
     polygons: ScenePolygons,
     error: f64,
     wanted: Range<usize>,
-    ranks: &mut dyn Ranks,
     progress: &mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
 ) -> (PartialMatrix, bool) {
     let wanted = part.polygons_without_rows(wanted);
-    let mut making = Making { part, ranks, progress };
+    let mut making = Making { part, progress };
     let done = match making.part.method() {
         Method::Exact => assembler::make(polygons, error, &wanted, &mut making),
         Method::Sparse => sparse::make(scene, polygons, error, &wanted, &mut making),

@@ -32,3 +32,4 @@ mod textures;
 mod verify;
 mod vertex;
 mod view_factor;
+mod work;

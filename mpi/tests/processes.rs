@@ -1,57 +1,72 @@
-//! Runs of several processes, by `mpirun`.
+//! Runs of several processes, by `mpirun`: Open MPI's or MPICH's.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_radiosity-mpi");
 const CORNELL_BOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell_box.obj");
 
 /// `mpirun` with so many processes of a thread each.
-fn mpirun(processes: usize, args: &[&str]) -> Child {
+fn mpirun(processes: usize, args: &[&str]) -> Command {
     let mut command = Command::new("mpirun");
-    command.args(["--oversubscribe", "-x", "RAYON_NUM_THREADS=1", "-n", &processes.to_string()]);
-    // Open MPI refuses to run as root otherwise, as it does in containers.
+    command.env("RAYON_NUM_THREADS", "1").args(["-n", &processes.to_string()]);
+    // Open MPI refuses to run as root otherwise, as it does in containers, and more processes than
+    // there are cores.
     for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] {
         command.env(name, "1");
     }
-    command.arg(PROGRAM).args(args).stderr(Stdio::null()).stdout(Stdio::null());
-    command.spawn().expect("mpirun is installed")
+    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1");
+    command.env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe");
+    command.arg(PROGRAM).args(args).stdin(Stdio::null());
+    command
 }
 
-/// What `processes` write to a file with these arguments.
-fn written(processes: usize, args: &[&str]) -> Vec<u8> {
+fn start(processes: usize, args: &[&str]) -> Child {
+    let mut command = mpirun(processes, args);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("mpirun is installed")
+}
+
+/// The file of this name that `processes` write with these arguments, and what they print.
+fn written(processes: usize, args: &[&str], name: &str) -> (Vec<u8>, Output) {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    let args = [args, &["--out", out.to_str().unwrap()]].concat();
-    assert!(mpirun(processes, &args).wait().unwrap().success());
-    std::fs::read(out).unwrap()
+    let args = [args, &["--out", folder.path().to_str().unwrap()]].concat();
+    let printed = mpirun(processes, &args).output().expect("mpirun is installed");
+    assert!(printed.status.success(), "{}", String::from_utf8_lossy(&printed.stderr));
+    (std::fs::read(folder.path().join(name)).unwrap(), printed)
 }
 
 #[test]
 fn any_number_of_processes_write_the_same_bytes() {
-    let args = ["view-factors", CORNELL_BOX, "--facets", "--two-sided", "light"];
-    let alone = written(1, &args);
-    for processes in [2, 4] {
-        assert!(written(processes, &args) == alone, "{processes} processes");
+    let commands: [(&[&str], &str); 5] = [
+        (&["bake", "--cpu", "--error", "0.1", "--write", "ply"], "ply"),
+        (&["light-map", "--cpu", "--error", "0.2", "--size", "64"], "light-map.exr"),
+        (&["grid", "--cpu", "--error", "0.1", "--height", "300", "--spacing", "100"], "grid.csv"),
+        (&["probes", "--cpu", "--error", "0.2", "--spacing", "200"], "probes.csv"),
+        (&["view-factors", "--facets", "--format", "npz"], "npz"),
+    ];
+    for (args, ending) in commands {
+        let (args, name) = ([args, &[CORNELL_BOX]].concat(), format!("cornell_box.{ending}"));
+        let (alone, _) = written(1, &args, &name);
+        for processes in [2, 3] {
+            let (bytes, printed) = written(processes, &args, &name);
+            assert!(bytes == alone, "{} by {processes} processes", args[0]);
+            let text = String::from_utf8(printed.stdout).unwrap();
+            let first = text.lines().next().unwrap();
+            let times = text.lines().filter(|line| *line == first).count();
+            assert_eq!(times, 1, "one process prints: {text}");
+        }
     }
 }
 
-/// An OBJ file of `count`² boxes of unlike heights.
-fn town(count: u32) -> String {
-    let mut text = String::new();
-    for house in 0..count * count {
-        let (x, y) = (3 * (house % count), 3 * (house / count));
-        let z = 1 + house * 7 % 5;
-        for (x, y, z) in [(x, y, 0), (x + 2, y, 0), (x + 2, y + 2, 0), (x, y + 2, 0)]
-            .into_iter()
-            .chain([(x, y, z), (x + 2, y, z), (x + 2, y + 2, z), (x, y + 2, z)])
-        {
-            text += &format!("v {x} {y} {z}\n");
-        }
-        text += "f -4 -3 -2 -1\nf -8 -7 -3 -4\nf -7 -6 -2 -3\nf -6 -5 -1 -2\nf -5 -8 -4 -1\n";
+#[test]
+fn wrong_usage_is_said_once() {
+    for args in [&["roast", CORNELL_BOX][..], &["bake", "no_such_file.obj"]] {
+        let output = mpirun(2, args).output().unwrap();
+        assert!(!output.status.success());
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(errors.matches("error: ").count(), 1, "{errors}");
     }
-    text
 }
 
 /// A process of the program that has `word` among its arguments.
@@ -66,23 +81,24 @@ fn process_with(word: &str) -> Option<u32> {
 }
 
 #[test]
-fn process_that_dies_ends_the_run_and_its_checkpoint_goes_on() {
+fn process_that_dies_ends_the_run_and_its_state_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
-    let (scene, rows, out) = (path("town.obj"), path("town.rows"), path("killed.npz"));
-    std::fs::write(&scene, town(6)).unwrap();
-    let args = ["view-factors", &scene, "--facets"];
-    let mut run = mpirun(2, &[&args[..], &["--checkpoint", &rows, "--out", &out]].concat());
-    while !Path::new(&rows).exists() {
-        assert!(run.try_wait().unwrap().is_none(), "it ended before there was a checkpoint");
+    let (state, out) = (path("box.state"), path("killed"));
+    let args = ["bake", CORNELL_BOX, "--cpu", "--error", "0.01", "--write", "ply"];
+    let mut run = start(2, &[&args[..], &["--state", &state, "--out", &out]].concat());
+    let kept = || std::fs::metadata(&state).map_or(0, |file| file.len());
+    while kept() < 1 << 16 {
+        assert!(run.try_wait().unwrap().is_none(), "it ended before there was a state");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let victim = process_with(&rows).expect("two processes are at work");
+    let victim = process_with(&state).expect("two processes are at work");
     assert!(Command::new("kill").args(["-9", &victim.to_string()]).status().unwrap().success());
     assert!(!run.wait().unwrap().success());
-    assert!(!Path::new(&out).exists());
-    let alone = written(1, &args);
-    let kept = std::fs::metadata(&rows).unwrap().len();
-    assert!(written(2, &[&args[..], &["--checkpoint", &rows]].concat()) == alone);
-    assert!(std::fs::metadata(&rows).unwrap().len() > kept, "rows were left to make");
+    assert!(!Path::new(&format!("{out}.ply")).exists());
+    let left = kept();
+    let (alone, _) = written(1, &args, "cornell_box.ply");
+    let (resumed, _) = written(2, &[&args[..], &["--state", &state]].concat(), "cornell_box.ply");
+    assert!(resumed == alone);
+    assert!(kept() > left, "there was work left");
 }

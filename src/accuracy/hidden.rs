@@ -20,6 +20,8 @@
 
 use glam::DVec3;
 
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::aabb::Aabb;
 
 /// Paths without light from which on a point counts as dark: a gap under a roof's boards had a
@@ -51,7 +53,7 @@ impl LitRegion {
 }
 
 /// What a point sees, by any number of rays.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Outlook {
     /// Share of the hemisphere in which there is a surface.
     pub covered: f64,

@@ -6,6 +6,7 @@ use crate::progress::Instant;
 use std::time::Duration;
 
 use crate::bake::settings::{BakeSettings, GatherSettings, SolveSettings};
+use crate::work::now;
 
 /// An error to be reached.
 #[derive(Clone, Copy)]
@@ -50,13 +51,13 @@ impl ErrorTarget<'_> {
 
     /// The time until the estimate of the error begins; without a limit, any.
     pub fn time_left(&self) -> Duration {
-        let left = |within: Within| within.gather_until.saturating_duration_since(Instant::now());
+        let left = |within: Within| within.gather_until.saturating_duration_since(now());
         self.within.map_or(Duration::MAX, left)
     }
 
     /// Whether the time is over.
     pub fn is_late(&self) -> bool {
-        self.within.is_some_and(|within| Instant::now() >= within.deadline)
+        self.within.is_some_and(|within| now() >= within.deadline)
     }
 
     /// The next target of a bake that goes on from one with these errors, if it does.

@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::accuracy::Measure;
 use crate::accuracy::hidden::LitRegion;
@@ -30,7 +31,6 @@ use crate::gather::refinement_indicator::RMS_OVER_JUMP;
 use crate::gather::two_sided::{TwoSidedPoint, gather_both_two_sided, gather_two_sided};
 use crate::gather::{Gather, GatheredMesh, IrradianceSample, RadiosityField};
 use crate::light::{PathTracer, SurfacePoint as PathStart};
-use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::golden_ratio_order;
 use crate::sampling::octaves::{Octaves, Part};
 use crate::sampling::random::random_numbers;
@@ -39,6 +39,7 @@ use crate::sampling::surface::{AreaSampler, SurfacePoint, shifted};
 use crate::scene::{Rgb, Scene};
 use crate::solver::Ledger;
 use crate::visibility::ray_scene::Hit;
+use crate::work::Batches;
 
 /// Reflected radiosity at and below which there is none in `scene`, W/m²: 1e-12 of the largest
 /// exitance, ten thousand times the rounding of their sum.
@@ -129,7 +130,7 @@ struct Sample {
 }
 
 /// What was gathered at a sample.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct SampleGathers {
     first: IrradianceSample,
     second: IrradianceSample,
@@ -257,9 +258,9 @@ impl ErrorEstimator<'_> {
         let order = golden_ratio_order(samples.len());
         let mut remaining = &order[..];
         // Three gathers a point, and paths.
-        let mut batches = BatchSizer::new((gatherer.preferred_batch_len() / 16).max(1));
+        let mut batches = Batches::new((gatherer.preferred_batch_len() / 16).max(1));
         while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
+            let (batch, found) = batches.try_next(&mut remaining, |batch| {
                 let points: Vec<TwoSidedPoint> = batch.iter().map(|&k| samples[k].point).collect();
                 let jittered: Vec<TwoSidedPoint> =
                     batch.iter().map(|&k| samples[k].jittered()).collect();
@@ -276,13 +277,17 @@ impl ErrorEstimator<'_> {
                 let later: Vec<Rgb> =
                     batch.par_iter().map(|&k| self.later(&samples[k], k)).collect();
                 let second = gather_two_sided(gatherer, &sources, &jittered)?;
-                for (i, &k) in batch.iter().enumerate() {
-                    let (first, second) = (first[i], second[i]);
-                    let (next, later) = (next[i], later[i]);
-                    gathers[k] = Some(SampleGathers { first, second, next, later });
-                }
-                Ok::<_, Error>(())
+                let of_point = |i: usize| SampleGathers {
+                    first: first[i],
+                    second: second[i],
+                    next: next[i],
+                    later: later[i],
+                };
+                Ok::<_, Error>((0..batch.len()).map(of_point).collect())
             })?;
+            for (&k, found) in batch.iter().zip(found) {
+                gathers[k] = Some(found);
+            }
             if progress(samples.len() - remaining.len(), samples.len()).is_break() {
                 break;
             }

@@ -35,10 +35,11 @@ use crate::gather::point_row::PointRows;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::light::PathTracer;
 use crate::mesh::Mesh;
-use crate::progress::{Instant, StopReason};
+use crate::progress::StopReason;
 use crate::sampling::octaves::Octaves;
 use crate::scene::Rgb;
 use crate::verify::octaves_of;
+use crate::work::now;
 
 /// Maximum number of rounds of refinement to one target. Plain choice.
 const MAX_ROUNDS: u32 = 12;
@@ -281,7 +282,7 @@ impl<'a> GatherPhase<'a> {
     ) -> Result<Option<Step>, Error> {
         let Some(target) = self.target else { return Ok(Some(Step::AllPasses)) };
         let [least, most] = model::RAYS_OF_FIRST_LIGHT;
-        let start = Instant::now();
+        let start = now();
         if self.exchange_by(least, progress)? == StopReason::Cancelled {
             // What they would have exchanged, evenly (the ambient term of Cohen et al. 1988).
             let albedo = self.shot.mesh.mean_albedo();
@@ -290,14 +291,14 @@ impl<'a> GatherPhase<'a> {
             return Ok(None);
         }
         // A ray of a vertex, and one of its row.
-        let mut time_per_ray = start.elapsed() / least;
+        let mut time_per_ray = (now() - start) / least;
         let rays = target.time_left().div_duration_f64(time_per_ray).min(most.into()) as u32;
         if rays >= 2 * least {
-            let start = Instant::now();
+            let start = now();
             if self.exchange_by(rays, progress)? == StopReason::Cancelled {
                 return Ok(None);
             }
-            time_per_ray = start.elapsed() / rays;
+            time_per_ray = (now() - start) / rays;
         }
         if time_per_ray * self.gather.rays < target.time_left() {
             return Ok(Some(Step::AllPasses));

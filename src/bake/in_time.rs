@@ -22,8 +22,8 @@ use crate::bake::result::BakeResult;
 use crate::bake::settings::BakeSettings;
 use crate::bake::to_error::{check_error, settings_for};
 use crate::error::Error;
-use crate::progress::Instant;
 use crate::scene::Scene;
+use crate::work::now;
 
 /// The error that a bake within a time goes to first.
 const FIRST_ERROR: f64 = 0.2;
@@ -48,7 +48,7 @@ pub(super) fn bake_in_time(
     overrides: &dyn Fn(&mut BakeSettings),
     progress: ProgressCallback,
 ) -> Result<BakeResult, Error> {
-    let start = Instant::now();
+    let start = now();
     let (least_error, each_group) = goal.map_or((0.0, false), |goal| (goal.error, goal.each_group));
     if goal.is_some() {
         check_error(least_error)?;
@@ -61,7 +61,6 @@ pub(super) fn bake_in_time(
             gather.contact_levels = 0;
         }
         overrides(settings);
-        settings.solve.checkpoint = None;
     };
     let gather_until = start + limit.mul_f64(1.0 - SHARE_OF_ESTIMATE);
     let within = Some(Within { gather_until, deadline: start + limit, least_error });
@@ -69,7 +68,7 @@ pub(super) fn bake_in_time(
     let (is_over, cancelled) = (Cell::new(false), Cell::new(false));
     let until: ProgressCallback = &mut |stage| {
         cancelled.set(cancelled.get() || progress(stage).is_break());
-        is_over.set(cancelled.get() || Instant::now() >= gather_until);
+        is_over.set(cancelled.get() || now() >= gather_until);
         if is_over.get() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let settings = settings_for(&target, &scene);

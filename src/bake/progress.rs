@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::progress::{Instant, Timings, lap};
 use crate::solver::Progress;
+use crate::work::agree;
 
 /// The stage that a bake is at.
 ///
@@ -56,10 +57,13 @@ pub(super) struct Reporter<'a> {
 impl Reporter<'_> {
     /// Reports `stage`, and before that a failure of the device that was not reported yet.
     pub fn report(&mut self, stage: BakeProgress) -> ControlFlow<()> {
-        if let Some(error) = self.backend.new_failure() {
-            (self.callback)(&BakeProgress::DeviceFailed(error))?;
-        }
-        (self.callback)(&stage)
+        let failure = self.backend.new_failure().map(BakeProgress::DeviceFailed);
+        let failed = failure.map_or(ControlFlow::Continue(()), |failed| (self.callback)(&failed));
+        // Devices of other processes go on.
+        agree(match failed {
+            ControlFlow::Continue(()) => (self.callback)(&stage),
+            stop => stop,
+        })
     }
 }
 

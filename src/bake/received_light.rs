@@ -20,9 +20,9 @@ use crate::gather::GatherPoint;
 use crate::gather::directional_light::DirectionalLight;
 use crate::gather::gather_points::SurfaceOffset;
 use crate::mesh::{Mesh, NodeId};
-use crate::progress::BatchSizer;
 use crate::scene::{Luminaire, Rgb, longest_edge};
 use crate::solver::ReceivedLight;
+use crate::work::Batches;
 
 /// Maximum number of times that an element is cut in four.
 const MAX_CUTS: u32 = 5;
@@ -73,16 +73,16 @@ fn add_gathered(
     let corners = vec![[0; 3]; mesh.element_count()];
     let mut gatherer = backend.gather_evenly(mesh, model::received_rays(elements.len()))?;
     let field = light_survey::dark(mesh, &corners);
-    let (mut remaining, mut batches) = (elements, BatchSizer::new(256));
+    let (mut remaining, mut batches) = (elements, Batches::new(256));
     while !remaining.is_empty() && proceed().is_continue() {
-        batches.next(&mut remaining, |batch| {
+        let (batch, samples) = batches.try_next(&mut remaining, |batch| {
             let point = |&e: &usize| above.above_element(mesh, mesh.element(e));
             let points: Vec<GatherPoint> = batch.iter().map(point).collect();
-            for (&e, sample) in batch.iter().zip(gatherer.gather(&field, &points)?) {
-                irradiance[e] += sample.irradiance;
-            }
-            Ok::<_, Error>(())
+            gatherer.gather(&field, &points)
         })?;
+        for (&e, sample) in batch.iter().zip(samples) {
+            irradiance[e] += sample.irradiance;
+        }
     }
     Ok(())
 }
@@ -92,17 +92,15 @@ fn add_luminaires(mesh: &Mesh, elements: &[usize], irradiance: &mut [Rgb], proce
     let Some(light) = DirectionalLight::of_scene(mesh.shared_scene()) else { return };
     let above = SurfaceOffset::new(mesh.scene());
     let luminaires: Vec<&Luminaire> = mesh.scene().luminaires().iter().collect();
-    let (mut remaining, mut batches) = (elements, BatchSizer::new(64));
+    let (mut remaining, mut batches) = (elements, Batches::new(64));
     while !remaining.is_empty() && proceed().is_continue() {
-        batches.next(&mut remaining, |batch| {
-            let of_element = |&e: &usize| {
-                let parts = parts(&above, mesh, mesh.element(e), &luminaires);
-                let sum = parts.into_iter().map(|p| p.share * light.of_luminaires(&p.point)).sum();
-                (e, sum)
-            };
-            let received: Vec<(usize, Rgb)> = batch.par_iter().map(of_element).collect();
-            received.into_iter().for_each(|(e, sum)| irradiance[e] += sum);
-        });
+        let of_element = |&e: &usize| -> Rgb {
+            let parts = parts(&above, mesh, mesh.element(e), &luminaires);
+            parts.into_iter().map(|p| p.share * light.of_luminaires(&p.point)).sum()
+        };
+        let (batch, received) = batches
+            .next(&mut remaining, |batch| batch.par_iter().map(of_element).collect::<Vec<_>>());
+        batch.iter().zip(received).for_each(|(&e, sum)| irradiance[e] += sum);
     }
 }
 

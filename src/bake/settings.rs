@@ -1,6 +1,5 @@
 //! All settings of a bake, and which of them an error asks for.
 
-use std::path::PathBuf;
 
 use crate::accuracy::Measure;
 use crate::accuracy::hidden::LitRegion;
@@ -62,10 +61,6 @@ pub struct SolveSettings {
     /// Whether GMRES takes the place of `solver.method` in scenes for which [`Solver::for_mesh`]
     /// chooses it.
     pub gmres_if_bright: bool,
-    /// A file that the state of the solve is written to, every few batches and at its end; if it is
-    /// there, the solve goes on from it: see [`Solver::resume`]. A bake that is killed loses the
-    /// last batches at most: writing takes about a tenth of the time.
-    pub checkpoint: Option<PathBuf>,
     /// Whether the light not yet shot is added, spread evenly (the ambient term of Cohen et al.
     /// 1988).
     pub ambient: bool,
@@ -204,7 +199,6 @@ impl BakeSettings {
             near_reach: 1.0,
             solver,
             gmres_if_bright: true,
-            checkpoint: None,
             ambient: false,
         };
         // As many elements as may gather: where the light is small and triangles are long, there

@@ -1,7 +1,7 @@
 //! The first phase of a bake: light is shot on elements.
 //!
 //! The scene is cut into elements. Rows of form factors come from the backend and are corrected for
-//! near receivers; a solver sends light along them. Given a checkpoint file the solve resumes it.
+//! near receivers; a solver sends light along them.
 //!
 //! ```text
 //! backend ─► ProximityCorrection ─► Solver ─► radiosity of elements
@@ -28,10 +28,11 @@ use crate::form_factor::FormFactors;
 use crate::form_factor::proximity::ProximityCorrection;
 use crate::gather::GatheredMesh;
 use crate::mesh::Mesh;
-use crate::progress::{Instant, StopReason};
+use crate::progress::StopReason;
 use crate::scene::Scene;
 use crate::solver::{Progress, ReceivedLight, Solution};
 use crate::verify::octaves_of;
+use crate::work::now;
 
 /// Time of shooting until its light is shown first. Plain choice: a picture within half a second,
 /// and none of scenes that take no longer.
@@ -104,8 +105,7 @@ pub(super) fn shoot(
     })
 }
 
-/// Spreads the light of `mesh`, and shows it on the way; from a checkpoint on if there is one, and
-/// writes one now and then.
+/// Spreads the light of `mesh`, and shows it on the way.
 fn solve(
     settings: &SolveSettings,
     mesh: &Mesh,
@@ -113,40 +113,27 @@ fn solve(
     rows: &mut dyn FormFactors,
     reporter: &mut Reporter,
 ) -> Result<Solution, Error> {
-    let solver = settings.solver_for(mesh);
-    let mut session = match &settings.checkpoint {
-        Some(path) if path.exists() => solver.resume_after(mesh, received, rows, path)?,
-        _ => solver.begin_after(mesh, received)?,
-    };
-    let (start, mut saved) = (Instant::now(), Instant::now());
-    let mut saving_time = Duration::ZERO;
+    let mut session = settings.solver_for(mesh).begin_after(mesh, received)?;
+    let start = now();
     let mut next_light = FIRST_LIGHT;
     loop {
         let mut progress = |p: &Progress| {
-            let progress = Progress { elapsed: start.elapsed(), ..*p };
+            let progress = Progress { elapsed: now() - start, ..*p };
             reporter.report(BakeProgress::Shooting(progress))
         };
         let stop = session.advance(rows, &mut progress)?;
-        // A tenth of the time at most is for writing.
-        if let Some(path) = &settings.checkpoint
-            && (stop.is_some() || saved.elapsed() >= 10 * saving_time)
-        {
-            let start = Instant::now();
-            session.save(path)?;
-            saved = Instant::now();
-            saving_time = start.elapsed();
-        }
         if stop.is_some() {
             return session.into_solution();
         }
-        if start.elapsed() >= next_light {
-            let shown = Instant::now();
+        if now() - start >= next_light {
+            let shown = now();
             let light = Arc::new(GatheredMesh::from_elements(mesh, &session.light_so_far())?);
             if reporter.report(BakeProgress::Light { light, estimate: None }).is_break() {
                 return session.into_solution();
             }
             // A tenth of the time at most is for showing.
-            next_light = (2 * start.elapsed()).max(start.elapsed() + 10 * shown.elapsed());
+            let end = now();
+            next_light = (2 * (end - start)).max(end - start + 10 * (end - shown));
         }
     }
 }

@@ -93,8 +93,7 @@ impl BakeTarget {
     /// setting, and must set the same ones to the same values at every call: what it sets stays,
     /// and the bake changes the others. Settings of the solve count at the first call
     /// only, since light is shot once; [`BakeSettings::gather`] may be taken away at the first call
-    /// and not later; within a time [`checkpoint`](crate::bake::SolveSettings::checkpoint) has no
-    /// effect, since nothing is shot.
+    /// and not later.
     ///
     /// # Errors
     /// Those of [`BakeTarget::bake`], and [`ErrorKind::Setting`] for a setting out of range.

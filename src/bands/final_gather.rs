@@ -1,10 +1,13 @@
 //! The light that a vertex gathers in every band, and its standard error.
 
+use serde::{Deserialize, Serialize};
+
 use super::lookup::Lookup;
 use super::spectra::Bands;
 use crate::gather::vertex_rows::VertexRow;
 
 /// Reflected light of one vertex, W/m² by band.
+#[derive(Serialize, Deserialize)]
 pub(super) struct GatheredVertex {
     pub reflected: Vec<f64>,
     /// Its standard error due to the rays: half the difference between two halves of them.

@@ -8,6 +8,8 @@
 
 use std::ops::ControlFlow;
 
+use serde::{Deserialize, Serialize};
+
 use super::lookup::{Lookup, add};
 use super::spectra::Bands;
 use crate::gather::point_row::PointRow;
@@ -23,6 +25,7 @@ const MAX_REMAINDER: f64 = 1e-4;
 const MAX_SWEEPS: u32 = 2000;
 
 /// The equation of one vertex.
+#[derive(Serialize, Deserialize)]
 pub(super) struct VertexEquation {
     /// Reflected part of the emitted light, W/m² by band.
     source: Vec<f64>,

@@ -25,9 +25,9 @@ use crate::gather::gather_points::{SurfaceOffset, is_buried};
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::gather::{Gather, GatherPoint, IrradianceSample};
 use crate::mesh::SurfaceTopology;
-use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::visibility::ray_scene::Hit;
+use crate::work::{Batches, agree};
 
 impl Camera {
     /// Draws `light` with the primary rays of [`Camera::image`], but with irradiance gathered at
@@ -60,7 +60,7 @@ impl Camera {
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let mut sky = vec![false; pixels.len()];
         let total = pixels.len();
-        let mut batch_sizer = BatchSizer::new(64);
+        let mut batches = Batches::new(64);
         for band in bands {
             let end = band.end;
             let (gathering, others): (Vec<PixelPart>, Vec<PixelPart>) =
@@ -71,20 +71,20 @@ impl Camera {
             }
             let mut queue = &gathering[..];
             while !queue.is_empty() {
-                let done = batch_sizer.next(&mut queue, |batch| {
+                let (batch, gathered) = batches.try_next(&mut queue, |batch| {
                     let points: Vec<TwoSidedPoint> = batch.iter().map(|part| part.point).collect();
-                    let gathered = gather_two_sided(gatherer, &field, &points)?;
-                    for (part, sample) in batch.iter().zip(&gathered) {
-                        pixels[part.pixel] += part.radiance(sample);
-                    }
-                    // Parts of the last pixel may be in the next batch.
-                    Ok::<_, Error>(batch.last().map_or(0, |part| part.pixel))
+                    gather_two_sided(gatherer, &field, &points)
                 })?;
-                if progress(done, total).is_break() {
+                for (part, sample) in batch.iter().zip(&gathered) {
+                    pixels[part.pixel] += part.radiance(sample);
+                }
+                // Parts of the last pixel may be in the next batch.
+                let done = batch.last().map_or(0, |part| part.pixel);
+                if agree(progress(done, total)).is_break() {
                     return Ok(None);
                 }
             }
-            if progress(end as usize, total).is_break() {
+            if agree(progress(end as usize, total)).is_break() {
                 return Ok(None);
             }
         }

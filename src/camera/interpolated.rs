@@ -3,14 +3,13 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
 use super::second_pass::{SecondPass, Sighting};
 use super::textured::LitSurface;
 use super::{Camera, PrimaryRays, RadianceImage, Seen};
 use crate::error::Error;
 use crate::gather::GatheredMesh;
 use crate::scene::Rgb;
+use crate::work;
 
 impl Camera {
     /// Draws `light` as [`Camera::image`] draws its surface, with textures: where a primary ray
@@ -41,11 +40,12 @@ impl Camera {
         let second_pass = SecondPass::new(&lit);
         let (mut pixels, mut sky) = (Vec::with_capacity(count as usize), vec![]);
         for band in bands {
-            let seen = |k| radiance(&lit, second_pass.as_ref(), k);
-            let (seen, is_sky): (Vec<_>, Vec<_>) = band.into_par_iter().map(seen).unzip();
-            pixels.extend(seen);
-            sky.extend(is_sky);
-            if progress(pixels.len(), count as usize).is_break() {
+            let seen = |k: usize| radiance(&lit, second_pass.as_ref(), band.start + k as u32);
+            for (radiance, is_sky) in work::map(band.len(), seen) {
+                pixels.push(radiance);
+                sky.push(is_sky);
+            }
+            if work::agree(progress(pixels.len(), count as usize)).is_break() {
                 return Ok(None);
             }
         }

@@ -4,15 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::coefficients::{DaylightCoefficients, direct};
 use super::year::{BATCHES, DaylightYear, LitHour};
 use crate::error::{Error, ErrorKind};
 use crate::gather::GatherPoint;
 use crate::light::PathTracer;
-use crate::progress::BatchSizer;
 use crate::scene::Scene;
 use crate::visibility::buried;
+use crate::work::{Batches, agree};
 
 /// What counts, and how exact it is to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,7 @@ impl Default for AnnualSettings {
 }
 
 /// A number and its standard error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The number.
     pub value: f64,
@@ -44,7 +45,7 @@ pub struct Estimate {
 }
 
 /// A year of daylight at a point. Shares are of the occupied hours.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AnnualDaylight {
     /// Share of hours with at least the target: DA (Reinhart and Walkenhorst 2001).
     pub autonomy: Estimate,
@@ -97,13 +98,14 @@ pub fn annual_daylight(
     }
     let tracer = PathTracer::of_shared(scene.clone());
     let (mut remaining, mut done) = (points, vec![]);
-    let mut batches = BatchSizer::new(rayon::current_num_threads());
+    let mut batches = Batches::new(rayon::current_num_threads());
     while !remaining.is_empty() {
         let at = |point: &GatherPoint| of_point(&tracer, year, point, settings);
-        done.extend(batches.next(&mut remaining, |batch| {
+        let (_, found) = batches.next(&mut remaining, |batch| {
             batch.par_iter().map(at).collect::<Vec<AnnualDaylight>>()
-        }));
-        if progress(done.len(), points.len()).is_break() {
+        });
+        done.extend(found);
+        if agree(progress(done.len(), points.len())).is_break() {
             return Ok(None);
         }
     }

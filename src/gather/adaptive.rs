@@ -19,10 +19,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use super::batch::{VertexValues, gather_batch};
+use super::batch::{Batch, VertexValues};
 use super::buried::extrapolate_into_buried;
-use super::centroid_probes::CentroidProbes;
+use super::centroid_probes::{CentroidProbes, probe};
 use super::directional_light::DirectionalLight;
 use super::further_bounces::GatheredFrom;
 use super::gather_points::VertexGatherPoints;
@@ -36,14 +37,17 @@ use super::sampled_mesh::{SampledMesh, after_split};
 use super::shadow_edges::resolve_shadow_edges;
 use super::source_light::SourceLight;
 use super::surplus::mean_preserving;
+use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::vertex_weights::vertex_weights;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
 use crate::accuracy::tail::Ranking;
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::progress::{BatchSizer, StopReason};
+use crate::progress::StopReason;
+
 use crate::scene::{Aabb, Rgb};
+use crate::work::{self, Batches, agree};
 
 /// Called with the progress after every batch; may stop the gather.
 pub(crate) type ProgressCallback<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
@@ -89,7 +93,7 @@ pub fn gather_at_vertices(
     let mut state =
         AdaptiveGather::new(mesh.clone(), &source.radiosity_field(), settings.region, measure);
     let gatherers = Gatherers { last: gatherer, coarse: None, probes: None, bounces: None };
-    let stop = state.run_passes(settings, gatherers, &mut progress)?;
+    let stop = state.run_passes(settings, gatherers, &mut |p| agree(progress(p)))?;
     let result = if stop == StopReason::Cancelled {
         state.to_gathered_mesh()
     } else {
@@ -402,11 +406,12 @@ impl AdaptiveGather {
         let unprobed: Vec<usize> = (0..elements).filter(counts).collect();
         let (source, scale) = (self.source.field(), &self.scale);
         let mut queue = &unprobed[..];
-        let mut batch_sizer = BatchSizer::new(gatherer.preferred_batch_len());
+        let mut batches = Batches::new(gatherer.preferred_batch_len());
         while !queue.is_empty() {
             let (samples, probes) = (&self.samples, &mut self.probes);
-            batch_sizer
-                .next(&mut queue, |batch| probes.probe(samples, batch, &source, scale, gatherer))?;
+            let (batch, errors) = batches
+                .try_next(&mut queue, |batch| probe(samples, batch, &source, scale, gatherer))?;
+            probes.set(batch, &errors);
             let report = Progress {
                 pass: self.pass,
                 refinements: self.refinements,
@@ -440,10 +445,7 @@ impl AdaptiveGather {
         }
         // Of the light that was shot: vertices may have missed some of it.
         let shot = self.source.shot();
-        let share_of = |(element, known): (usize, &mut Option<(usize, Share)>)| {
-            if let &mut Some((pool, share)) = known {
-                return (pool, Share { element, ..share });
-            }
+        let share_of = |element: usize| {
             let (samples, scale) = (&self.samples, &self.scale);
             let probed = self.probes.error(element);
             let square = squared_error(samples, &shot, scale, settings, element, probed);
@@ -457,11 +459,20 @@ impl AdaptiveGather {
                 true => usize::from(scale.is_far(mesh, node)),
                 false => mesh.group(node) as usize,
             };
-            let share = (pool, Share { square, area, element });
-            *known = (!has_buried_node(samples, element)).then_some(share);
-            share
+            (pool, Share { square, area, element }, has_buried_node(samples, element))
         };
-        let shares: Vec<(usize, Share)> = known.par_iter_mut().enumerate().map(share_of).collect();
+        let unknown: Vec<usize> = (0..known.len()).filter(|&e| known[e].is_none()).collect();
+        let found = work::map(unknown.len(), |k| share_of(unknown[k]));
+        let in_place = |(element, known): (usize, &Option<(usize, Share)>)| {
+            known.map(|(pool, share)| (pool, Share { element, ..share }))
+        };
+        let mut shares: Vec<Option<(usize, Share)>> =
+            known.iter().enumerate().map(in_place).collect();
+        for (&element, (pool, share, is_temporary)) in unknown.iter().zip(found) {
+            shares[element] = Some((pool, share));
+            known[element] = shares[element].filter(|_| !is_temporary);
+        }
+        let shares: Vec<(usize, Share)> = shares.into_iter().flatten().collect();
         let pools = shares.iter().map(|&(pool, _)| pool + 1).max().unwrap_or(0);
         let mut by_pool: Vec<Vec<Share>> = vec![vec![]; pools];
         for (pool, share) in shares {
@@ -502,17 +513,18 @@ impl AdaptiveGather {
         let mut pending: Vec<u32> = vertices.iter().copied().filter(gathers).collect();
         let total = pending.len();
         let mut gathered = 0;
-        let mut batch_sizer = BatchSizer::new(gatherer.preferred_batch_len());
+        let mut batches = Batches::new(gatherer.preferred_batch_len());
         let mut attempt = 0;
         while !pending.is_empty() {
             let mut retries = vec![];
             let mut queue = &pending[..];
             while !queue.is_empty() {
-                let batch = batch_sizer.next(&mut queue, |vertices| {
+                let (vertices, samples) = batches.try_next(&mut queue, |vertices| {
                     let point = |&v: &u32| points.point(v, attempt).weighing(weights[v as usize]);
-                    let points = vertices.par_iter().map(point).collect();
-                    gather_batch(vertices, points, &source, gatherer)
+                    let points: Vec<TwoSidedPoint> = vertices.par_iter().map(point).collect();
+                    gather_two_sided(gatherer, &source, &points)
                 })?;
+                let batch = Batch { vertices, samples };
                 let unresolved = batch.unresolved(&points, attempt);
                 gathered += batch.vertices.len() - unresolved.len();
                 retries.extend(unresolved);
@@ -560,7 +572,7 @@ fn coarser(settings: &RefinementSettings, passes: u32) -> RefinementSettings {
 const ELEMENTS_PER_SPLIT: usize = 1024;
 
 /// The share of an element in the error of its mesh.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct Share {
     /// Squared error times area.
     square: f64,

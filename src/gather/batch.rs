@@ -4,16 +4,14 @@ use rayon::prelude::*;
 
 use super::directional_light::{Direct, DirectionalLight};
 use super::gather_points::VertexGatherPoints;
-use super::two_sided::{TwoSidedPoint, gather_two_sided};
-use super::{Gather, IrradianceSample, RadiosityField};
+use super::IrradianceSample;
 use crate::accuracy::hidden::LitRegion;
-use crate::error::Error;
 use crate::scene::Rgb;
 
 /// A batch of vertices, with a sample at one point of each.
 pub(super) struct Batch<'v> {
     pub vertices: &'v [u32],
-    samples: Vec<IrradianceSample>,
+    pub samples: Vec<IrradianceSample>,
 }
 
 /// Values of vertices, by their number.
@@ -26,16 +24,6 @@ pub(super) struct VertexValues<'s> {
     pub hidden: &'s mut [bool],
     /// Empty where there is no directional light.
     pub direct: &'s mut [Direct],
-}
-
-/// Gathers one point for each of `vertices`.
-pub(super) fn gather_batch<'v>(
-    vertices: &'v [u32],
-    points: Vec<TwoSidedPoint>,
-    source: &RadiosityField,
-    gatherer: &mut dyn Gather,
-) -> Result<Batch<'v>, Error> {
-    Ok(Batch { vertices, samples: gather_two_sided(gatherer, source, &points)? })
 }
 
 impl Batch<'_> {

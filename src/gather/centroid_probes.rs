@@ -10,7 +10,7 @@ use super::refinement_indicator::ErrorScale;
 use super::sampled_mesh::{SampledMesh, after_split};
 use super::surplus::{CERTAIN_ERRORS, beyond_noise};
 use super::two_sided::{TwoSidedPoint, gather_two_sided};
-use super::{Gather, RadiosityField};
+use super::{Gather, IrradianceSample, RadiosityField};
 use crate::error::Error;
 use crate::scene::Rgb;
 
@@ -43,38 +43,42 @@ impl CentroidProbes {
         self.errors = after_split(&self.errors, split, f32::NAN);
     }
 
-    /// Gathers `source` at the centroids of `elements`. Errors are relative to at least the floor
-    /// of `scale`; centroids that are buried have none.
-    pub fn probe(
-        &mut self,
-        samples: &SampledMesh,
-        elements: &[usize],
-        source: &RadiosityField,
-        scale: &ErrorScale,
-        gatherer: &mut dyn Gather,
-    ) -> Result<(), Error> {
-        let mesh = &samples.mesh;
-        let above = SurfaceOffset::new(mesh.scene());
-        let point = |&e: &usize| {
-            let node = mesh.element(e);
-            TwoSidedPoint::new(above.above_element(mesh, node), mesh.material(node))
-        };
-        let points: Vec<TwoSidedPoint> = elements.iter().map(point).collect();
-        let gathered = gather_two_sided(gatherer, source, &points)?;
-        for (&e, sample) in elements.iter().zip(&gathered) {
-            let material = mesh.material(mesh.element(e));
-            let probed = material.albedo() * sample.irradiance + material.exitance;
-            let corners = samples.corners()[e].map(|v| samples.reflected[v as usize]);
-            let expected = corners.iter().sum::<Rgb>() / 3.0 + material.exitance;
-            let darker = probed.length().min(expected.length()).max(scale.radiosity_floor);
-            let of_corners = samples.corners()[e].map(|v| samples.noise[v as usize].powi(2));
-            let own = material.albedo().max_element() * sample.noise;
-            let noise = (own * own + of_corners.iter().sum::<f64>() / 9.0).sqrt();
-            let difference = beyond_noise((probed - expected).length(), CERTAIN_ERRORS * noise);
-            let is_known = !is_buried(sample, scale.touching()) && darker > 0.0;
-            // Of a bump of unknown shape over the whole element, half is the root mean square.
-            self.errors[e] = if is_known { (0.5 * difference / darker) as f32 } else { 0.0 };
-        }
-        Ok(())
+    /// Sets the errors that the `elements` were probed to have.
+    pub fn set(&mut self, elements: &[usize], errors: &[f32]) {
+        elements.iter().zip(errors).for_each(|(&e, &error)| self.errors[e] = error);
     }
+}
+
+/// The errors of `elements`, by `source` gathered at their centroids. Errors are relative to at
+/// least the floor of `scale`; centroids that are buried have none.
+pub(super) fn probe(
+    samples: &SampledMesh,
+    elements: &[usize],
+    source: &RadiosityField,
+    scale: &ErrorScale,
+    gatherer: &mut dyn Gather,
+) -> Result<Vec<f32>, Error> {
+    let mesh = &samples.mesh;
+    let above = SurfaceOffset::new(mesh.scene());
+    let point = |&e: &usize| {
+        let node = mesh.element(e);
+        TwoSidedPoint::new(above.above_element(mesh, node), mesh.material(node))
+    };
+    let points: Vec<TwoSidedPoint> = elements.iter().map(point).collect();
+    let gathered = gather_two_sided(gatherer, source, &points)?;
+    let error = |(&e, sample): (&usize, &IrradianceSample)| {
+        let material = mesh.material(mesh.element(e));
+        let probed = material.albedo() * sample.irradiance + material.exitance;
+        let corners = samples.corners()[e].map(|v| samples.reflected[v as usize]);
+        let expected = corners.iter().sum::<Rgb>() / 3.0 + material.exitance;
+        let darker = probed.length().min(expected.length()).max(scale.radiosity_floor);
+        let of_corners = samples.corners()[e].map(|v| samples.noise[v as usize].powi(2));
+        let own = material.albedo().max_element() * sample.noise;
+        let noise = (own * own + of_corners.iter().sum::<f64>() / 9.0).sqrt();
+        let difference = beyond_noise((probed - expected).length(), CERTAIN_ERRORS * noise);
+        let is_known = !is_buried(sample, scale.touching()) && darker > 0.0;
+        // Of a bump of unknown shape over the whole element, half is the root mean square.
+        if is_known { (0.5 * difference / darker) as f32 } else { 0.0 }
+    };
+    Ok(elements.iter().zip(&gathered).map(error).collect())
 }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::GatherPoint;
 use super::light_tree::LightTree;
 use super::luminaire_light::{LuminaireLight, SMALL_BOUND};
@@ -27,7 +29,7 @@ pub(crate) struct DirectionalLight {
 }
 
 /// What that light adds to the reflected radiosity of a vertex, W/m² per channel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Direct {
     /// If nothing were in its way.
     pub unoccluded: Rgb,

@@ -8,6 +8,7 @@
 //! hundred times between its walls.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::linear::gauss_seidel::{self, BLOCK, Equations};
 use crate::scene::Rgb;
@@ -17,7 +18,7 @@ use crate::scene::Rgb;
 const PRECISION: f64 = 1e-3;
 
 /// The equation of a vertex.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Equation {
     pub albedo: Rgb,
     /// Reflected light from elsewhere, W/m²; or the change of it.
@@ -27,7 +28,7 @@ pub(crate) struct Equation {
 }
 
 /// A vertex that another receives light from. In 32 bits, since there may be millions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Term {
     pub vertex: u32,
     /// Share of the hemisphere, per channel.

@@ -25,6 +25,7 @@ use super::surplus::HierarchicalSurplus;
 use crate::error::Error;
 use crate::scene::Rgb;
 use crate::vertex::keys::VertexKey;
+use crate::work;
 
 /// The refined mesh, and an estimate of the error that remains in each of its elements, W/m²: a
 /// length over the channels.
@@ -78,7 +79,7 @@ fn to_be_split(
         (surplus > settings.interpolation_tolerance * group_factor * radiosity)
             .then_some((surplus / radiosity, e))
     };
-    let mut found: Vec<(f64, usize)> = (0..count).into_par_iter().filter_map(surplus).collect();
+    let mut found: Vec<(f64, usize)> = work::map(count, surplus).into_iter().flatten().collect();
     found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     found.truncate(settings.max_elements.saturating_sub(count) / 3);
     let mut elements: Vec<usize> = found.into_iter().map(|(_, e)| e).collect();
@@ -137,7 +138,7 @@ fn residual_errors(samples: &SampledMesh, source: &RadiosityField, split: &[usiz
         };
         factor * error
     };
-    let own: Vec<f64> = (0..samples.mesh.element_count()).into_par_iter().map(error).collect();
+    let own = work::map(samples.mesh.element_count(), error);
     let mut errors = Vec::with_capacity(own.len() + 3 * split.len());
     for (e, error) in own.into_iter().enumerate() {
         let children = if is_split(e) { 4 } else { 1 };

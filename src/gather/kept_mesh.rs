@@ -13,10 +13,12 @@ use super::{Gather, GatheredMesh, IrradianceSample};
 use crate::accuracy::hidden::NEAR;
 use crate::error::Error;
 use crate::mesh::{Mesh, SurfaceTopology};
-use crate::progress::{BatchSizer, StopReason};
+use crate::progress::StopReason;
+
 use crate::scene::Rgb;
 use crate::vertex::VertexMesh;
 use crate::vertex::keys::Vertices;
+use crate::work::{Batches, agree};
 
 /// The vertices of a mesh, each with what it gathered.
 pub(crate) struct KeptVertices {
@@ -70,27 +72,26 @@ impl KeptVertices {
         let field = light.radiosity_field();
         let mut pending: Vec<u32> = all.filter(|&v| albedo[v as usize] != Rgb::ZERO).collect();
         let (total, mut done, mut gather_count) = (pending.len(), 0, 0);
-        let mut batches = BatchSizer::new(gatherer.preferred_batch_len());
+        let mut batches = Batches::new(gatherer.preferred_batch_len());
         for attempt in 0.. {
             let (mut retries, mut remaining) = (vec![], &pending[..]);
             while !remaining.is_empty() {
-                batches.next(&mut remaining, |batch| {
+                let (batch, gathered) = batches.try_next(&mut remaining, |batch| {
                     let of_batch: Vec<TwoSidedPoint> =
                         batch.iter().map(|&v| points[v as usize]).collect();
-                    let gathered = gather_two_sided(gatherer, &field, &of_batch)?;
-                    for (&v, sample) in batch.iter().zip(gathered) {
-                        buried[v as usize] = gather_points.is_buried(v, &sample);
-                        samples[v as usize] = sample;
-                        if buried[v as usize] && gather_points.has_more(v, attempt) {
-                            retries.push(v);
-                        } else {
-                            done += 1;
-                        }
-                    }
-                    gather_count += batch.len() as u64;
-                    Ok::<_, Error>(())
+                    gather_two_sided(gatherer, &field, &of_batch)
                 })?;
-                if progress(done, total).is_break() {
+                for (&v, sample) in batch.iter().zip(gathered) {
+                    buried[v as usize] = gather_points.is_buried(v, &sample);
+                    samples[v as usize] = sample;
+                    if buried[v as usize] && gather_points.has_more(v, attempt) {
+                        retries.push(v);
+                    } else {
+                        done += 1;
+                    }
+                }
+                gather_count += batch.len() as u64;
+                if agree(progress(done, total)).is_break() {
                     return Ok(None);
                 }
             }

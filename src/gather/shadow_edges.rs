@@ -14,13 +14,14 @@
 
 use rayon::prelude::*;
 
-use super::directional_light::{Direct, DirectionalLight};
+use super::directional_light::DirectionalLight;
 use super::gather_points::VertexGatherPoints;
 use super::refinement_indicator::{ErrorScale, RMS_OVER_JUMP, counted_area, is_finest};
 use super::refinement_settings::RefinementSettings;
 use super::sampled_mesh::{SampledMesh, new_vertices};
 use crate::error::Error;
 use crate::scene::Rgb;
+use crate::work;
 
 /// Squared error that elements at edges may have together without being split, over what the mesh
 /// may have: those are slivers, as the shortest edge bounds all others.
@@ -52,8 +53,8 @@ pub(super) fn resolve_shadow_edges(
         let (mut finer, old_numbers) = samples.with_split(&crossed)?;
         let points = VertexGatherPoints::new(&finer.mesh, &finer.vertices, scale.touching());
         let new = new_vertices(&old_numbers);
-        let at = |&v: &u32| light.reflected(points.albedo(v), &points.point(v, 0), None);
-        let direct: Vec<Direct> = new.par_iter().map(at).collect();
+        let at = |v: u32| light.reflected(points.albedo(v), &points.point(v, 0), None);
+        let direct = work::map(new.len(), |k| at(new[k]));
         for (v, direct) in new.into_iter().zip(direct) {
             finer.direct[v as usize] = direct;
         }

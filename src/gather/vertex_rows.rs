@@ -7,13 +7,15 @@
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use super::gather_points::VertexGatherPoints;
 use super::point_row::{PointRow, PointRows};
 use crate::mesh::Mesh;
-use crate::progress::BatchSizer;
 use crate::scene::Rgb;
 use crate::vertex::keys::Vertices;
+use crate::work::{Batches, agree};
 
 /// What a vertex sees, by parts of the rays.
 pub(crate) struct VertexRow {
@@ -61,7 +63,7 @@ impl<'a> VertexRows<'a> {
 
     /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
     /// rays; none if `progress`, called after each batch with the number done, breaks.
-    pub fn map<T: Send>(
+    pub fn map<T: Send + Serialize + DeserializeOwned>(
         &self,
         vertices: &[u32],
         parts: u32,
@@ -69,14 +71,14 @@ impl<'a> VertexRows<'a> {
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Option<Vec<T>> {
         let mut results = Vec::with_capacity(vertices.len());
-        let mut batches = BatchSizer::new(256);
+        let mut batches = Batches::new(256);
         let mut remaining = vertices;
         while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
-                let made = batch.par_iter().map(|&v| work(v, &self.row(v, parts)));
-                results.par_extend(made);
-            });
-            if progress(results.len()).is_break() {
+            let made = |&v: &u32| work(v, &self.row(v, parts));
+            let (_, made) = batches
+                .next(&mut remaining, |batch| batch.par_iter().map(made).collect::<Vec<T>>());
+            results.extend(made);
+            if agree(progress(results.len())).is_break() {
                 return None;
             }
         }

@@ -21,16 +21,17 @@ use std::sync::Arc;
 use fastrand::Rng;
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::emitters::{Emitters, Weights};
 use super::luminaires::Luminaires;
-use crate::progress::BatchSizer;
 use crate::sampling::octaves::Part;
 use crate::sampling::random::random_numbers;
 use crate::scene::{Facets, Material, Rgb, Scene, Sun};
 use crate::visibility::offset;
 use crate::visibility::panes::Panes;
 use crate::visibility::ray_scene::{Hit, RayScene};
+use crate::work::{Batches, agree};
 
 /// Maximum probability that a path continues: paths end in a room of albedo 1, too, and the weights
 /// keep the result unbiased.
@@ -69,7 +70,7 @@ pub struct PathTracer<'a> {
 }
 
 /// A point on the front of a triangle of the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
     /// Index of the triangle.
     pub triangle: usize,
@@ -89,7 +90,7 @@ pub(crate) enum Visit {
 }
 
 /// What a point reflects, estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reflected {
     /// Reflected radiosity: radiosity without the material's exitance, W/m² per channel. The point
     /// itself has the reflectance of its material, also where that has a texture: it is the light
@@ -148,17 +149,16 @@ impl<'a> PathTracer<'a> {
     ) -> Vec<Reflected> {
         let numbered: Vec<(usize, &SurfacePoint)> = points.iter().enumerate().collect();
         let (mut remaining, mut done) = (&numbered[..], vec![]);
-        let mut batches = BatchSizer::new(rayon::current_num_threads());
+        let mut batches = Batches::new(rayon::current_num_threads());
         while !remaining.is_empty() {
-            let batch = batches.next(&mut remaining, |batch| {
-                let point = |&(k, point): &(usize, &SurfacePoint)| {
-                    let mut rng = random_numbers(&[seed, k as u64]);
-                    self.mean(point, paths, &mut rng)
-                };
-                batch.par_iter().map(point).collect::<Vec<_>>()
-            });
-            done.extend(batch);
-            if progress(done.len(), points.len()).is_break() {
+            let point = |&(k, point): &(usize, &SurfacePoint)| {
+                let mut rng = random_numbers(&[seed, k as u64]);
+                self.mean(point, paths, &mut rng)
+            };
+            let (_, means) = batches
+                .next(&mut remaining, |batch| batch.par_iter().map(point).collect::<Vec<_>>());
+            done.extend(means);
+            if agree(progress(done.len(), points.len())).is_break() {
                 break;
             }
         }

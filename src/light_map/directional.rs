@@ -17,9 +17,9 @@ use super::texel_points::TexelPoints;
 use crate::backend::Backend;
 use crate::bake::BakeResult;
 use crate::error::Error;
-use crate::gather::{Gather, GatherPoint, GatheredMesh};
-use crate::progress::BatchSizer;
+use crate::gather::{Gather, GatherPoint, GatheredMesh, IrradianceSample};
 use crate::scene::Rgb;
+use crate::work::{Batches, agree};
 
 /// Tilted normals of a texel.
 const NORMALS: usize = 4;
@@ -59,31 +59,32 @@ impl LightMap {
             |&k: &u32| self.gathered[k as usize] && self.triangles[k as usize] != NO_TRIANGLE;
         let texels: Vec<u32> = (0..self.gathered.len() as u32).filter(is_lit).collect();
         let mut changes = [0; 3].map(|_| vec![Rgb::ZERO; self.gathered.len()]);
-        let (mut remaining, mut batches) = (&texels[..], BatchSizer::new(64));
+        let (mut remaining, mut batches) = (&texels[..], Batches::new(64));
         while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
-                let point =
-                    |texel: u32| points.point(texel, self.triangles[texel as usize] as usize);
+            let point = |texel: u32| points.point(texel, self.triangles[texel as usize] as usize);
+            let (batch, found) = batches.try_next(&mut remaining, |batch| {
                 let around: Vec<GatherPoint> =
                     batch.iter().flat_map(|&texel| tilted(point(texel).point)).collect();
                 let samples = gatherer.gather(&field, &around)?;
-                for (&texel, samples) in batch.iter().zip(samples.chunks_exact(NORMALS)) {
-                    let normal = point(texel).point.normal;
-                    let (t, b) = normal.any_orthonormal_pair();
-                    let [e0, e1, e2, e3] = [0, 1, 2, 3].map(|k: usize| samples[k].irradiance);
-                    let middle = self.irradiance[texel as usize];
-                    let along_tangents = [e0 - e2, e1 - e3].map(|d| d / (2.0 * FRAC_1_SQRT_2));
-                    let mean = (e0 + e1 + e2 + e3) / 4.0;
-                    let along_normal = (middle - mean) / (1.0 - FRAC_1_SQRT_2);
-                    for (axis, changes) in changes.iter_mut().enumerate() {
-                        changes[texel as usize] = along_tangents[0] * t[axis]
-                            + along_tangents[1] * b[axis]
-                            + along_normal * normal[axis];
-                    }
-                }
-                Ok::<_, Error>(())
+                let of_texel = |samples: &[IrradianceSample]| -> [Rgb; NORMALS] {
+                    std::array::from_fn(|k| samples[k].irradiance)
+                };
+                Ok::<_, Error>(samples.chunks_exact(NORMALS).map(of_texel).collect())
             })?;
-            if progress(texels.len() - remaining.len(), texels.len()).is_break() {
+            for (&texel, [e0, e1, e2, e3]) in batch.iter().zip(found) {
+                let normal = point(texel).point.normal;
+                let (t, b) = normal.any_orthonormal_pair();
+                let middle = self.irradiance[texel as usize];
+                let along_tangents = [e0 - e2, e1 - e3].map(|d| d / (2.0 * FRAC_1_SQRT_2));
+                let mean = (e0 + e1 + e2 + e3) / 4.0;
+                let along_normal = (middle - mean) / (1.0 - FRAC_1_SQRT_2);
+                for (axis, changes) in changes.iter_mut().enumerate() {
+                    changes[texel as usize] = along_tangents[0] * t[axis]
+                        + along_tangents[1] * b[axis]
+                        + along_normal * normal[axis];
+                }
+            }
+            if agree(progress(texels.len() - remaining.len(), texels.len())).is_break() {
                 return Ok(None);
             }
         }

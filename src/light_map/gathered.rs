@@ -13,8 +13,8 @@ use crate::error::{Error, ErrorKind};
 use crate::gather::gather_points::is_buried;
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::gather::{Gather, GatheredMesh, IrradianceSample};
-use crate::progress::BatchSizer;
 use crate::scene::Rgb;
+use crate::work::{Batches, agree};
 
 /// The irradiance of all surfaces of a scene in one texture.
 #[derive(Clone, Debug)]
@@ -78,21 +78,18 @@ impl LightMap {
             .collect();
         let mut map = LightMap::empty(atlas.clone(), triangles);
         let (field, points) = (light.radiosity_field(), TexelPoints::new(&atlas));
-        let (mut remaining, mut batches) = (&covered[..], BatchSizer::new(256));
+        let (mut remaining, mut batches) = (&covered[..], Batches::new(256));
         while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
-                let triangle = |texel: u32| map.triangles[texel as usize] as usize;
-                let point = |&texel: &u32| points.point(texel, triangle(texel));
+            let (batch, samples) = batches.try_next(&mut remaining, |batch| {
+                let point = |&texel: &u32| points.point(texel, map.triangle(texel));
                 let batch_points: Vec<TwoSidedPoint> = batch.iter().map(point).collect();
-                let samples = gather_two_sided(gatherer, &field, &batch_points)?;
-                let size = |&texel: &u32| points.texel_size(triangle(texel));
-                let sizes: Vec<f64> = batch.iter().map(size).collect();
-                for ((&texel, sample), size) in batch.iter().zip(&samples).zip(sizes) {
-                    map.set(texel as usize, sample, !is_buried(sample, size));
-                }
-                Ok::<_, Error>(())
+                gather_two_sided(gatherer, &field, &batch_points)
             })?;
-            if progress(covered.len() - remaining.len(), covered.len()).is_break() {
+            for (&texel, sample) in batch.iter().zip(&samples) {
+                let size = points.texel_size(map.triangle(texel));
+                map.set(texel as usize, sample, !is_buried(sample, size));
+            }
+            if agree(progress(covered.len() - remaining.len(), covered.len())).is_break() {
                 return Ok(None);
             }
         }
@@ -111,6 +108,11 @@ impl LightMap {
             near_paths: vec![false; count],
             triangles,
         }
+    }
+
+    /// The triangle that a texel gathers on.
+    fn triangle(&self, texel: u32) -> usize {
+        self.triangles[texel as usize] as usize
     }
 
     /// Sets what a texel gathered: it counts if the texel `is_open`, not inside of anything.

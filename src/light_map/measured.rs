@@ -28,11 +28,11 @@ use crate::gather::GatherPoint;
 use crate::gather::gather_points::{SurfaceOffset, outlook};
 use crate::gather::two_sided::{TwoSidedPoint, gather_two_sided};
 use crate::geometry::barycentric::barycentric;
-use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::{golden_ratio_order, r2_point};
 use crate::sampling::rotation::CellRotation;
 use crate::sampling::surface::AreaSampler;
 use crate::scene::Rgb;
+use crate::work::{Batches, agree};
 
 /// A point, and the map's value there.
 struct ShownPoint {
@@ -69,27 +69,27 @@ impl LightMap {
         let (region, sky) = (baked.settings.solve.lit_region(scene), scene.sky());
         let mut errors = vec![];
         let order = golden_ratio_order(points.len());
-        let (mut remaining, mut batches) = (&order[..], BatchSizer::new(64));
+        let (mut remaining, mut batches) = (&order[..], Batches::new(64));
         while !remaining.is_empty() {
-            batches.next(&mut remaining, |batch| {
+            let (batch, pairs) = batches.try_next(&mut remaining, |batch| {
                 let mut gather = |which: usize| {
                     let points: Vec<TwoSidedPoint> =
                         batch.iter().map(|&k| points[k].points[which]).collect();
                     gather_two_sided(&mut *gatherer, &field, &points)
                 };
                 let (first, second) = (gather(0)?, gather(1)?);
-                for ((&k, first), second) in batch.iter().zip(&first).zip(&second) {
-                    let ShownPoint { albedo, shown, area, .. } = points[k];
-                    let pair = [first, second];
-                    let GatherPoint { position, normal, .. } = points[k].points[0].point;
-                    if !outlook(pair, normal, sky).is_hidden(&region, position) {
-                        let gathered = pair.map(|sample| albedo * sample.irradiance);
-                        errors.push(TexelError { shown, gathered, area });
-                    }
-                }
-                Ok::<_, Error>(())
+                Ok::<_, Error>(first.into_iter().zip(second).collect())
             })?;
-            if progress(points.len() - remaining.len(), points.len()).is_break() {
+            for (&k, (first, second)) in batch.iter().zip(&pairs) {
+                let ShownPoint { albedo, shown, area, .. } = points[k];
+                let pair = [first, second];
+                let GatherPoint { position, normal, .. } = points[k].points[0].point;
+                if !outlook(pair, normal, sky).is_hidden(&region, position) {
+                    let gathered = pair.map(|sample| albedo * sample.irradiance);
+                    errors.push(TexelError { shown, gathered, area });
+                }
+            }
+            if agree(progress(points.len() - remaining.len(), points.len())).is_break() {
                 return Ok(None);
             }
         }

@@ -7,16 +7,17 @@
 
 use std::ops::ControlFlow;
 
+use arrayvec::ArrayVec;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::nested_cells::{
     CellSamples, Estimate, ItemSamples, NestedCells, SampleSums, SpreadSums, Value,
 };
-use crate::progress::BatchSizer;
 use crate::sampling::low_discrepancy::radical_inverse;
 use crate::sampling::random::random_numbers;
 use crate::sampling::surface::AreaSampler;
+use crate::work::{Batches, agree};
 
 /// Sets of cells: the edges of one show with an eighth of its steps.
 const SETS: usize = 8;
@@ -240,32 +241,33 @@ impl<const M: usize> Paths<'_, M> {
         let along = AreaSampler::new(self.order.iter().map(weight));
         let (first, round) = (self.count, radical_inverse(self.count as u32 + 1));
         let numbers: Vec<usize> = (first..first + more).collect();
-        let (mut remaining, mut batches) = (&numbers[..], BatchSizer::new(1024));
+        let (mut remaining, mut batches) = (&numbers[..], Batches::new(1024));
         while !remaining.is_empty() {
-            let traced = batches.next(&mut remaining, |batch| {
-                let trace = |&path: &usize| {
-                    let share = ((path - first) as f64 + round) / more as f64;
-                    let item = self.order[along.locate(share).0];
-                    let scale = self.origins[item as usize].scale;
-                    (item, sample(item as usize, path).map(|value| value / scale))
-                };
-                batch.par_iter().map(trace).collect::<Vec<_>>()
+            let trace = |&path: &usize| {
+                let share = ((path - first) as f64 + round) / more as f64;
+                let item = self.order[along.locate(share).0];
+                let scale = self.origins[item as usize].scale;
+                let value = sample(item as usize, path).map(|value| value / scale);
+                (item, ArrayVec::from(value))
+            };
+            let (_, traced) = batches.next(&mut remaining, |batch| {
+                batch.par_iter().map(trace).collect::<Vec<(u32, ArrayVec<f64, M>)>>()
             });
             for (item, value) in traced {
-                self.add(item, &value);
+                self.add(item, std::array::from_fn(|k| value[k]));
             }
-            progress(self.count)?;
+            agree(progress(self.count))?;
         }
         ControlFlow::Continue(())
     }
 
-    fn add(&mut self, item: u32, value: &Value<M>) {
+    fn add(&mut self, item: u32, value: Value<M>) {
         let slot = &mut self.slots[item as usize];
         if *slot == NO_SLOT {
             *slot = self.samples.len() as u32;
             self.samples.push(ItemSamples { item, sums: SampleSums::default() });
         }
-        self.samples[*slot as usize].sums.add_sample(value);
+        self.samples[*slot as usize].sums.add_sample(&value);
         self.count += 1;
     }
 

@@ -13,6 +13,7 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::scene::Rgb;
 
@@ -20,7 +21,7 @@ use crate::scene::Rgb;
 pub const COUNT: usize = 9;
 
 /// A function of direction by its harmonics to order 2, three channels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Harmonics {
     /// Coefficients c_lm with f(n) = Σ c_lm Y_lm(n): (l, m) = (0, 0), (1, −1), (1, 0), (1, 1),
     /// (2, −2), …, (2, 2), in the unit of f.

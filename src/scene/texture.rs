@@ -330,6 +330,14 @@ pub struct MaterialTextures {
     pub mask: Option<TextureMap>,
 }
 
+impl MaterialTextures {
+    /// All of its images.
+    pub(super) fn images(&self) -> impl Iterator<Item = &Texture> {
+        let maps = [&self.reflectance, &self.exitance, &self.mask];
+        maps.into_iter().flatten().map(|map| &*map.texture)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

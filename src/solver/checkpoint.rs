@@ -17,7 +17,6 @@ use std::{fs, io};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::flux_state::ReceivedLight;
 use super::method::saved_identity;
 use super::saved_state::{DAMAGED, SavedSession, refuse};
 use super::{SolveSession, Solver};
@@ -88,19 +87,9 @@ impl Solver {
         form_factors: &dyn FormFactors,
         path: impl AsRef<Path>,
     ) -> Result<SolveSession<'m>, Error> {
-        self.resume_after(mesh, &ReceivedLight::default(), form_factors, path.as_ref())
-    }
-
-    /// As [`Solver::resume`], for elements that had `received` light before the solve.
-    pub(crate) fn resume_after<'m>(
-        &self,
-        mesh: &'m Mesh,
-        received: &ReceivedLight,
-        form_factors: &dyn FormFactors,
-        path: &Path,
-    ) -> Result<SolveSession<'m>, Error> {
+        let path = path.as_ref();
         let bytes = fs::read(path).map_err(file_error(path, "name a file that can be read"))?;
-        let session = self.begin_after(mesh, received)?;
+        let session = self.begin(mesh)?;
         self.restore_bytes(session, form_factors, &bytes).map_err(|e| e.inside(path))
     }
 

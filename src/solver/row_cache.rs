@@ -17,8 +17,8 @@ use super::ledger::largest_share;
 use crate::error::Error;
 use crate::form_factor::{FormFactors, Row, checked_rows};
 use crate::mesh::{Mesh, NodeId};
-use crate::progress::BatchSizer;
 use crate::scene::Rgb;
+use crate::work::Batches;
 
 /// Rows by patch, and the flux sent along each.
 #[derive(Clone)]
@@ -31,7 +31,7 @@ pub(super) struct RowCache {
     /// Rows computed so far.
     pub rows_made: u64,
     /// Sizes of requests to the source of rows, so that none takes long.
-    requests: BatchSizer,
+    requests: Batches,
 }
 
 /// Record of a patch that has sent light.
@@ -56,7 +56,7 @@ impl RowCache {
             histories: BTreeMap::new(),
             free_bytes: budget,
             rows_made: 0,
-            requests: BatchSizer::new(16),
+            requests: Batches::new(16),
         }
     }
 
@@ -146,7 +146,7 @@ impl RowCache {
         importance: f64,
     ) -> Result<Vec<Row>, Error> {
         let make = |request: &[NodeId]| checked_rows(row_source, mesh, request, importance);
-        let rows = self.requests.next(patches, make)?;
+        let (_, rows) = self.requests.try_next(patches, make)?;
         self.rows_made += rows.len() as u64;
         Ok(rows)
     }

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use fastrand::Rng;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::settings::Settings;
 use super::solution::Solution;
@@ -15,9 +16,9 @@ use crate::accuracy::hidden::{LitRegion, Outlook, PATHS_IN_THE_DARK};
 use crate::accuracy::mean_square::{MeanSquare, MeasuredPoint, TrimmedSquare};
 use crate::error::{Error, ErrorKind, quoted};
 use crate::light::{PathTracer, SurfacePoint};
-use crate::progress::BatchSizer;
 use crate::sampling::random::random_numbers;
 use crate::scene::{Aabb, Rgb, Scene};
+use crate::work::{self, Batches, agree};
 
 /// Points of groups, and what was traced at them so far.
 #[derive(Debug)]
@@ -42,7 +43,7 @@ struct Stratum {
 }
 
 /// A point, and the paths that began there.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct TracedPoint {
     /// Number among those of its group.
     index: usize,
@@ -142,7 +143,8 @@ impl<'a> Sampler<'a> {
         let scene = self.scene;
         let points = self.strata.iter_mut().flat_map(|stratum| &mut stratum.points);
         let unknown: Vec<&mut TracedPoint> = points.filter(|p| p.solution.is_none()).collect();
-        unknown.into_par_iter().for_each(|p| p.solution = solution.reflected(scene, &p.point));
+        let found = work::map(unknown.len(), |k| solution.reflected(scene, &unknown[k].point));
+        unknown.into_iter().zip(found).for_each(|(point, found)| point.solution = found);
         let (drawn, missing) = (self.drawn(), self.missing());
         let mut lost = self.traced().filter(|(_, point)| point.solution.is_none());
         match lost.next() {
@@ -177,14 +179,13 @@ impl<'a> Sampler<'a> {
     ) -> ControlFlow<()> {
         let jobs: Vec<(usize, TracedPoint)> = self.traced().filter(|p| p.1.paths < paths).collect();
         let (mut remaining, mut done) = (&jobs[..], vec![]);
-        let mut batches = BatchSizer::new(rayon::current_num_threads());
+        let mut batches = Batches::new(rayon::current_num_threads());
         while !remaining.is_empty() {
-            done.extend(batches.next(&mut remaining, |batch| {
-                let traced =
-                    |(group, point): &(usize, TracedPoint)| self.more(*group, point, paths);
-                batch.par_iter().map(traced).collect::<Vec<_>>()
-            }));
-            progress(done.len(), jobs.len())?;
+            let traced = |(group, point): &(usize, TracedPoint)| self.more(*group, point, paths);
+            let (_, more) = batches
+                .next(&mut remaining, |batch| batch.par_iter().map(traced).collect::<Vec<_>>());
+            done.extend(more);
+            agree(progress(done.len(), jobs.len()))?;
         }
         let mut done = done.into_iter();
         for point in self.strata.iter_mut().flat_map(|stratum| &mut stratum.points) {

@@ -22,8 +22,8 @@ use super::pair_visibility::PairVisibility;
 use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::scene_polygons::ScenePolygons;
-use crate::ranks::share_out;
 use crate::sampling::hash::split_mix64;
+use crate::work::Batches;
 
 /// Computes the rows of the polygons `wanted`; `None` if stopped.
 pub(super) fn make(
@@ -33,15 +33,15 @@ pub(super) fn make(
     making: &mut Making,
 ) -> Option<()> {
     let assembler = Assembler::new(polygons, error);
-    let (count, mut done) = (wanted.len(), 0);
-    // Progress some 100 times, with work for all cores and timely cancellation.
-    let batch = (count / 100).clamp(4, 64) * making.ranks.size();
-    for batch in wanted.chunks(batch) {
+    let (count, mut remaining) = (wanted.len(), wanted);
+    // A polygon is done by one thread.
+    let mut batches = Batches::new(4).at_least(2 * rayon::current_num_threads());
+    while !remaining.is_empty() {
         let of_polygon = |&s: &u32| assembler.row(s as usize);
-        let rows = share_out(batch, making.ranks, of_polygon);
+        let (batch, rows) =
+            batches.next(&mut remaining, |batch| batch.par_iter().map(of_polygon).collect());
         batch.iter().zip(rows).for_each(|(&s, row)| making.add(s, row));
-        done += batch.len();
-        making.tell_all(done, count)?;
+        making.report(count - remaining.len(), count)?;
     }
     Some(())
 }

@@ -12,8 +12,8 @@ use super::matrix::{Estimate, Factor, Missing, ViewFactors};
 use super::matrix_rows::MatrixRows;
 use super::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind, quoted};
-use crate::ranks::Ranks;
 use crate::scene::Scene;
+use crate::work::agree;
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radipar\x02";
@@ -82,19 +82,13 @@ impl Exchange {
 /// Rows being computed, and their progress callback.
 pub(super) struct Making<'a> {
     pub part: PartialMatrix,
-    pub ranks: &'a mut dyn Ranks,
     pub progress: &'a mut dyn FnMut(&PartialMatrix, usize, usize) -> ControlFlow<()>,
 }
 
 impl Making<'_> {
     /// Reports progress; `None` if that stops the work in any process.
-    pub fn tell_all(&mut self, done: usize, of: usize) -> Option<()> {
-        let goes_on = (self.progress)(&self.part, done, of).is_continue();
-        let goes_on = match self.ranks.size() {
-            1 => goes_on,
-            _ => self.ranks.all_gather(&[u8::from(goes_on)]).iter().all(|told| *told == [1]),
-        };
-        goes_on.then_some(())
+    pub fn report(&mut self, done: usize, of: usize) -> Option<()> {
+        agree((self.progress)(&self.part, done, of)).is_continue().then_some(())
     }
 
     pub fn add(&mut self, polygon: u32, row: PolygonRow) {

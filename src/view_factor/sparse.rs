@@ -24,13 +24,14 @@ use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
 use super::scene_polygons::ScenePolygons;
-use crate::progress::BatchSizer;
-use crate::ranks::share_out;
 use crate::scene::Scene;
+use crate::work::Batches;
 
-/// Polygons of a process between two progress calls, where several processes take the same batches;
-/// alone they follow the clock. Plain choice.
-const BATCH: usize = 256;
+/// Polygons, or pieces of rows, of the first batch. Plain choice.
+const BATCH: usize = 32;
+
+/// Pairs of a row that are estimated by one thread, one after the other. Plain choice.
+const PAIRS_OF_PIECE: usize = 64;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
 /// many polygons.
@@ -86,22 +87,25 @@ pub(super) fn make(
     let (fronts, rows, known) = (&fronts, &rows, &known);
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
     let later = met_either_way(rows);
-    let mut done = 2 * count;
-    let (mut remaining, processes) = (wanted, making.ranks.size());
-    let mut batches = BatchSizer::new(BATCH / 8);
-    while !remaining.is_empty() {
-        let (batch, exchanges) = next_batch(&mut batches, &mut remaining, processes, |batch| {
-            // The number of pairs of polygons varies by a factor of a thousand.
-            let pieces = |&s: &u32| later[s as usize].chunks(64).map(move |c| (s, c));
-            let pieces: Vec<(u32, &[Count])> = batch.iter().flat_map(pieces).collect();
+    // The number of pairs of polygons varies by a factor of a thousand.
+    let pieces_of = |&s: &u32| later[s as usize].chunks(PAIRS_OF_PIECE).map(move |c| (s, c));
+    let pieces: Vec<(u32, &[Count])> = wanted.iter().flat_map(pieces_of).collect();
+    let mut batches = Batches::new(BATCH);
+    let (mut remaining, mut rows_to_do) = (&pieces[..], wanted);
+    let mut fronts_of_row = vec![];
+    while !rows_to_do.is_empty() {
+        if !remaining.is_empty() {
             let of_piece =
                 |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
-            let of_pieces = share_out(&pieces, making.ranks, of_piece);
-            let polygons: Vec<u32> = pieces.iter().map(|(s, _)| *s).collect();
-            (batch, polygons.into_iter().zip(of_pieces))
-        });
-        let mut exchanges = exchanges.peekable();
-        for &s in batch {
+            let (batch, exchanges) = batches
+                .next(&mut remaining, |batch| batch.par_iter().map(of_piece).collect::<Vec<_>>());
+            fronts_of_row.extend(batch.iter().map(|(s, _)| *s).zip(exchanges));
+        }
+        // Rows are whole up to that of the next piece.
+        let next = remaining.first().map_or(u32::MAX, |(s, _)| *s);
+        let (whole, rest) = rows_to_do.split_at(rows_to_do.partition_point(|&s| s < next));
+        let mut exchanges = fronts_of_row.drain(..).peekable();
+        for &s in whole {
             let mut row =
                 PolygonRow { fronts: vec![], back: to_backs(fronts, &rows[s as usize], s) };
             while let Some((_, piece)) = exchanges.next_if(|(of, _)| *of == s) {
@@ -110,8 +114,10 @@ pub(super) fn make(
             row.fronts = sums_by_group(row.fronts);
             making.add(s, row);
         }
-        done += batch.len();
-        making.tell_all(done * count / of, count)?;
+        fronts_of_row = exchanges.collect();
+        rows_to_do = rest;
+        let done = 2 * count + wanted.len() - rest.len();
+        making.report(done * count / of, count)?;
     }
     Some(())
 }
@@ -125,32 +131,17 @@ fn in_batches<R: Send + Serialize + DeserializeOwned>(
     work: impl Fn(&u32) -> R + Sync,
 ) -> Option<Vec<R>> {
     let mut results = Vec::with_capacity(items.len());
-    let (mut remaining, processes) = (items, making.ranks.size());
+    let mut remaining = items;
     // A polygon is done by one thread.
-    let mut batches = BatchSizer::new(BATCH / 8).at_least(2 * rayon::current_num_threads());
+    let mut batches = Batches::new(BATCH).at_least(2 * rayon::current_num_threads());
     while !remaining.is_empty() {
-        results.extend(next_batch(&mut batches, &mut remaining, processes, |batch| {
-            share_out(batch, making.ranks, &work)
-        }));
+        let (_, made) = batches
+            .next(&mut remaining, |batch| batch.par_iter().map(&work).collect::<Vec<R>>());
+        results.extend(made);
         let count = items.len();
-        making.tell_all((told.start + results.len()) * count / told.end, count)?;
+        making.report((told.start + results.len()) * count / told.end, count)?;
     }
     Some(results)
-}
-
-/// The result of `work` on the next of the `remaining` polygons, of this number of processes.
-fn next_batch<'t, R>(
-    batches: &mut BatchSizer,
-    remaining: &mut &'t [u32],
-    processes: usize,
-    work: impl FnOnce(&'t [u32]) -> R,
-) -> R {
-    if processes == 1 {
-        return batches.next(remaining, work);
-    }
-    let (batch, rest) = remaining.split_at(remaining.len().min(BATCH * processes));
-    *remaining = rest;
-    work(batch)
 }
 
 /// Sums exchanges with polygons, in ascending order of their groups, to one exchange per group.

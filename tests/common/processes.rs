@@ -1,16 +1,19 @@
 //! Threads that act as processes which share out work.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 
-use radiosity::ranks::Ranks;
+use radiosity::work::{Ranks, with_ranks};
 
 /// One of some threads that act as processes.
-#[derive(Debug)]
-pub struct Thread {
+#[derive(Clone, Debug)]
+struct Thread {
     rank: usize,
     given: Arc<Mutex<Vec<Vec<u8>>>>,
     barrier: Arc<Barrier>,
-    calls: usize,
+    /// The counter that all share, and how many numbers each has taken.
+    counter: Arc<AtomicU64>,
+    taken: Arc<Vec<AtomicU64>>,
 }
 
 impl Ranks for Thread {
@@ -19,35 +22,41 @@ impl Ranks for Thread {
     }
 
     fn size(&self) -> usize {
-        self.given.lock().unwrap().len()
+        self.taken.len()
     }
 
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
-        self.calls += 1;
         self.given.lock().unwrap()[self.rank] = bytes.to_vec();
         self.barrier.wait();
         let all = self.given.lock().unwrap().clone();
         self.barrier.wait();
         all
     }
+
+    fn take(&mut self) -> u64 {
+        self.taken[self.rank].fetch_add(1, Ordering::Relaxed);
+        self.counter.fetch_add(1, Ordering::Relaxed)
+    }
 }
 
-/// What `work` makes in each of `size` processes.
-pub fn in_processes<R: Send>(size: usize, work: impl Fn(&mut Thread) -> R + Sync) -> Vec<R> {
-    let given = Arc::new(Mutex::new(vec![vec![]; size]));
-    let barrier = Arc::new(Barrier::new(size));
-    std::thread::scope(|scope| {
+/// What `work` makes in each of `size` processes, by their rank.
+pub fn in_processes<R: Send>(size: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let thread = Thread {
+        rank: 0,
+        given: Arc::new(Mutex::new(vec![vec![]; size])),
+        barrier: Arc::new(Barrier::new(size)),
+        counter: Arc::default(),
+        taken: Arc::new((0..size).map(|_| AtomicU64::new(0)).collect()),
+    };
+    let made = std::thread::scope(|scope| {
         let process = |rank| {
-            let (given, barrier) = (given.clone(), barrier.clone());
-            let work = &work;
-            scope.spawn(move || {
-                let mut thread = Thread { rank, given, barrier, calls: 0 };
-                let result = work(&mut thread);
-                assert!(thread.calls > 0, "nothing was shared out");
-                result
-            })
+            let (thread, work) = (Thread { rank, ..thread.clone() }, &work);
+            scope.spawn(move || with_ranks(Box::new(thread), || work(rank)))
         };
         let threads: Vec<_> = (0..size).map(process).collect();
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-    })
+    });
+    let idle = thread.taken.iter().any(|taken| taken.load(Ordering::Relaxed) == 0);
+    assert!(!idle, "nothing was shared out");
+    made
 }

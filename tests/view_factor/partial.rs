@@ -2,7 +2,6 @@
 
 use std::ops::{ControlFlow, Range};
 
-use radiosity::ranks::{Alone, Ranks};
 use radiosity::view_factor::{Missing, PartialMatrix};
 use radiosity::{ErrorKind, Scene, ViewFactors};
 
@@ -18,7 +17,7 @@ fn go(_: &PartialMatrix, _: usize, _: usize) -> ControlFlow<()> {
 }
 
 fn rows(scene: &Scene, groups: Range<usize>, done: Option<PartialMatrix>) -> PartialMatrix {
-    PartialMatrix::make(scene, ERROR, &[], groups, done, &mut Alone, go).unwrap()
+    PartialMatrix::make(scene, ERROR, &[], groups, done, go).unwrap()
 }
 
 /// An exact scene, and one that is too large for that.
@@ -54,7 +53,7 @@ fn what_was_stopped_goes_on() {
         let n = scene.groups().len();
         let mut told = 0;
         let stopped =
-            PartialMatrix::make(&scene, ERROR, &[], 0..n, None, &mut Alone, |part, _, _| {
+            PartialMatrix::make(&scene, ERROR, &[], 0..n, None, |part, _, _| {
                 told += 1;
                 match part.missing().len() < n {
                     true => ControlFlow::Break(()),
@@ -75,8 +74,8 @@ fn any_number_of_processes_make_the_same_matrix() {
         let expected = whole(&scene, absent);
         let n = scene.groups().len();
         for size in [2, 3] {
-            let made = in_processes(size, |ranks| {
-                let part = PartialMatrix::make(&scene, ERROR, &[], 0..n, None, ranks, go);
+            let made = in_processes(size, |_| {
+                let part = PartialMatrix::make(&scene, ERROR, &[], 0..n, None, go);
                 part.unwrap().into_matrix().unwrap()
             });
             assert!(made.iter().all(|matrix| *matrix == expected), "{size} processes");
@@ -87,10 +86,10 @@ fn any_number_of_processes_make_the_same_matrix() {
 #[test]
 fn one_process_stops_all() {
     let (scene, _) = &scenes()[1];
-    let left = in_processes(2, |ranks| {
-        let stops = ranks.rank() == 1;
+    let left = in_processes(2, |rank| {
+        let stops = rank == 1;
         let part =
-            PartialMatrix::make(scene, ERROR, &[], 0..5, None, ranks, |_, _, _| match stops {
+            PartialMatrix::make(scene, ERROR, &[], 0..5, None, |_, _, _| match stops {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             });
@@ -104,16 +103,16 @@ fn one_process_stops_all() {
 fn other_scenes_and_settings_are_refused() {
     let [(scene, _), (other, _)] = scenes();
     let part = rows(&scene, 0..2, None);
-    let coarse = PartialMatrix::make(&scene, 0.5, &[], 0..6, None, &mut Alone, go).unwrap();
+    let coarse = PartialMatrix::make(&scene, 0.5, &[], 0..6, None, go).unwrap();
     for wrong in [coarse, rows(&other, 0..1, None)] {
         let error = PartialMatrix::merge([part.clone(), wrong.clone()]).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Setting);
         assert!(error.to_string().contains("part 2") && error.to_string().contains("another"));
-        let error = PartialMatrix::make(&scene, ERROR, &[], 0..6, Some(wrong), &mut Alone, go);
+        let error = PartialMatrix::make(&scene, ERROR, &[], 0..6, Some(wrong), go);
         assert!(error.unwrap_err().to_string().contains("another scene"));
     }
     assert!(PartialMatrix::merge([]).unwrap_err().to_string().contains("none"));
-    let error = PartialMatrix::make(&scene, ERROR, &[], 2..7, None, &mut Alone, go).unwrap_err();
+    let error = PartialMatrix::make(&scene, ERROR, &[], 2..7, None, go).unwrap_err();
     assert!(error.to_string().contains("2..7; the matrix has 6 rows"), "{error}");
 }
 

@@ -8,6 +8,7 @@ use clap::Args;
 use clap::error::ErrorKind as Usage;
 use radiosity::accuracy::Measure;
 use radiosity::backend::AdapterKind;
+use radiosity::work::is_first;
 use radiosity::{Backend, Error, ErrorKind, Rgb, io};
 
 use crate::{interrupt, progress};
@@ -177,6 +178,13 @@ impl Output {
         self.stem.with_added_extension(ending)
     }
 
+    /// Writes the report of a command as its last file, with the names, sizes and hashes of the
+    /// others: [`info`](crate::info) tells by them whether all are of one run.
+    pub fn write_report(&self, mut report: serde_json::Value) {
+        report["files"] = progress::written_files();
+        self.write("json", format!("{report:#}\n").as_bytes());
+    }
+
     /// Writes the file with this ending: [`write_file`].
     pub fn write(&self, ending: &str, bytes: &[u8]) {
         write_file(&self.path(ending), bytes);
@@ -277,6 +285,9 @@ impl DeviceOptions {
 /// # Errors
 /// [`ErrorKind::File`] when no file can be created in the folder of `path`.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
+    if !is_first() {
+        return Ok(());
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let probe = folder.join(format!(".radiosity-{}", std::process::id()));
     let result = std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe));

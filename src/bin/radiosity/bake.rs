@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use files::Files;
 use radiosity::bake::Outcome;
+use radiosity::work::{Journal, JournalPart, is_first, with_journal};
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, kept_mesh};
 use settings::Adjustment;
 
@@ -63,8 +64,8 @@ pub struct Bake {
     /// wavelengths, STEM.bands.exr and .png
     #[arg(long, value_name = "FILE.json", hide = true)]
     bands: Option<PathBuf>,
-    /// Write the state of the solve to this file while it runs, and resume from the file where it
-    /// exists; not with --time, which shoots nothing
+    /// Keep what was computed in this file while the bake runs, and resume from the file where it
+    /// exists: the files are those of a bake that was not interrupted; not with --time
     #[arg(long, value_name = "FILE", hide = true)]
     state: Option<PathBuf>,
     #[command(flatten)]
@@ -134,9 +135,6 @@ impl Bake {
     fn adjust(&self, settings: &mut BakeSettings) {
         settings.measure = self.measure.measure();
         self.set.iter().for_each(|adjustment| adjustment(settings));
-        if self.state.is_some() {
-            settings.solve.checkpoint.clone_from(&self.state);
-        }
         match (self.gather, &mut settings.gather) {
             (Some(Gather::None), gather) => *gather = None,
             (Some(Gather::Needed), Some(gather)) => gather.refinement.initial_subdivisions = 0,
@@ -158,15 +156,23 @@ impl Bake {
         let opening = Instant::now();
         let device = self.device.open()?;
         let baking = Instant::now();
-        // Otherwise the bake drops the scene once it is cut.
-        let kept = self.keep_mesh.then(|| scene.clone());
-        let mut baked = progress::of_bake(|unshot_goal, report| {
-            self.bake(scene, &device, start, unshot_goal, report)
-        })?;
-        if let Some(scene) = kept {
-            baked = self.on_kept_mesh(&baked, scene, &device)?;
+        let mut state = self.state(&scene, &device)?;
+        let light = with_journal(&mut state, || {
+            // Otherwise the bake drops the scene once it is cut.
+            let kept = self.keep_mesh.then(|| scene.clone());
+            let mut baked = progress::of_bake(|unshot_goal, report| {
+                self.bake(scene, &device, start, unshot_goal, report)
+            })?;
+            if let Some(scene) = kept {
+                baked = self.on_kept_mesh(&baked, scene, &device)?;
+            }
+            let band_light = bands::light(bands.as_ref(), &baked)?;
+            Ok::<_, Stop>((baked, band_light))
+        });
+        if let Some(Err(error)) = state.map(Journal::finish) {
+            progress::add_unwritten(&error);
         }
-        let band_light = bands::light(bands.as_ref(), &baked)?;
+        let (mut baked, band_light) = light?;
         let stopped = interrupt::stopped();
         warnings.extend(warn_of_failure(&baked));
         warn_of_darkness(&baked);
@@ -200,6 +206,29 @@ impl Bake {
         };
         self.files.write_report(report.to_json());
         Ok(report)
+    }
+
+    /// The state that the bake goes on from and adds to, if it is to have one: in the first of
+    /// several processes.
+    fn state(&self, scene: &Scene, device: &Backend) -> Result<Option<Journal>, Stop> {
+        let Some(path) = self.state.as_ref().filter(|_| is_first()) else { return Ok(None) };
+        args::check_writable(path)?;
+        let mut settings = BakeSettings::for_error(0.05, scene);
+        self.adjust(&mut settings);
+        let adapter = device.adapter();
+        let part = |name: &str, text: String| JournalPart {
+            name: name.into(),
+            hash: xxhash_rust::xxh3::xxh3_64(text.as_bytes()),
+        };
+        let target = (self.target(), self.keep_mesh, &self.bands);
+        let parts = [
+            part("version of the program", env!("CARGO_PKG_VERSION").into()),
+            part("scene or light", format!("{}", scene.fingerprint())),
+            part("target or settings", format!("{target:?} {settings:?}")),
+            part("device", format!("{:?} {}", adapter.kind, adapter.name)),
+        ];
+        let reading = || Journal::open(path, &parts);
+        Ok(Some(progress::of_reading(path, reading)?))
     }
 
     /// The light of a bake at the vertices of `scene`.

@@ -14,6 +14,8 @@ use std::ops::ControlFlow;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use radiosity::work::agree;
+
 /// Exit status of a program that was interrupted: 128 + SIGINT, as shells have it.
 pub const EXIT_STATUS: u8 = 130;
 
@@ -35,12 +37,12 @@ pub fn catch() {
     });
 }
 
-/// Whether the program was asked to end.
+/// Whether the program, in any of its processes, was asked to end.
 pub fn stopped() -> bool {
-    STOPPED.load(Ordering::Relaxed)
+    agree(flow()).is_break()
 }
 
 /// What progress callbacks answer: break after Ctrl-C.
 pub fn flow() -> ControlFlow<()> {
-    if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    if STOPPED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

@@ -11,6 +11,7 @@
 //! radiosity probes        SCENE.obj    spherical harmonics       -> JSON, CSV
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
+//! radiosity info          STEM.json    whether files are of one run
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
@@ -35,6 +36,7 @@ mod camera_option;
 mod canvas;
 mod grid;
 mod heat;
+mod info;
 mod interrupt;
 mod light;
 mod light_map;
@@ -51,6 +53,9 @@ mod ugr;
 mod verify;
 mod view_factors;
 mod viewer_options;
+#[cfg(feature = "mpi")]
+#[path = "../../../mpi/src/world.rs"]
+mod world;
 
 use std::process::ExitCode;
 
@@ -79,9 +84,21 @@ enum Command {
     Ugr(Box<ugr::Options>),
     TradeOff(Box<trade_off::Options>),
     Verify(Box<verify::Options>),
+    Info(info::Options),
 }
 
+#[cfg(not(feature = "mpi"))]
 fn main() -> ExitCode {
+    run()
+}
+
+/// In each of the processes that `mpirun` starts.
+#[cfg(feature = "mpi")]
+fn main() -> ExitCode {
+    world::run(run)
+}
+
+fn run() -> ExitCode {
     let mut program = program();
     let parsed = program.try_get_matches_from_mut(std::env::args_os()).and_then(|mut matches| {
         let name = matches.subcommand_name().unwrap_or_default().to_string();
@@ -102,6 +119,7 @@ fn main() -> ExitCode {
         Command::Ugr(options) => options.run(),
         Command::TradeOff(options) => options.run(),
         Command::Verify(options) => options.run(),
+        Command::Info(options) => options.run(),
     };
     let unwritten = progress::report_unwritten();
     match done {

@@ -28,6 +28,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use radiosity::bake::BakeProgress;
 use radiosity::gather::Progress as GatherProgress;
 use radiosity::solver::Progress;
+use radiosity::work::{alone, is_first};
 use radiosity::{Error, ErrorKind, Solver};
 use serde_json::{Value, json};
 use xxhash_rust::xxh3::Xxh3;
@@ -90,9 +91,14 @@ pub fn of_reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
 
 /// Runs `work`, which writes this file, with that shown. If it cannot be written there, it is
 /// written to the system's folder for temporary files; none if that fails too. Other files are
-/// written nevertheless, and [`report_unwritten`] says at the end which were not.
+/// written nevertheless, and [`report_unwritten`] says at the end which were not. Of several
+/// processes the first writes.
 pub fn of_writing<T>(path: &Path, work: impl Fn(&Path) -> Result<T, Error>) -> Option<T> {
+    if !is_first() {
+        return None;
+    }
     let stage = format!("writing {}", path.display());
+    let work = |path: &Path| alone(|| work(path));
     let error = match of_stage(&stage, || work(path)) {
         Ok(done) => {
             locked(&WRITTEN).push(path.into());
@@ -131,6 +137,11 @@ static WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(vec![]);
 /// What is said of those that were not.
 static UNWRITTEN: Mutex<Vec<String>> = Mutex::new(vec![]);
 
+/// Adds a file that could not be written.
+pub fn add_unwritten(error: &Error) {
+    locked(&UNWRITTEN).push(error.to_string());
+}
+
 /// Says which files could not be written, if any.
 pub fn report_unwritten() -> bool {
     let unwritten = locked(&UNWRITTEN);
@@ -150,7 +161,7 @@ pub fn written_files() -> Value {
 }
 
 /// The number of bytes of a file, and their XXH3-64: piece by piece, since a file can be large.
-fn size_and_hash(path: &Path) -> std::io::Result<(u64, u64)> {
+pub fn size_and_hash(path: &Path) -> std::io::Result<(u64, u64)> {
     let (mut file, mut hash) = (File::open(path)?, Xxh3::new());
     let (mut buffer, mut size) = (vec![0; 1 << 16], 0);
     loop {

@@ -257,11 +257,10 @@ impl Files {
         Ok(())
     }
 
-    /// Writes the report, with the names of all files before it.
-    pub fn write_report(&self, mut json: serde_json::Value) {
+    /// Writes the report, if it is asked for.
+    pub fn write_report(&self, report: serde_json::Value) {
         if self.writes(Format::Json) {
-            json["files"] = progress::written_files();
-            self.output.write("json", format!("{json:#}\n").as_bytes());
+            self.output.write_report(report);
         }
     }
 

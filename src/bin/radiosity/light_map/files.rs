@@ -130,11 +130,18 @@ impl Options {
                 write("rgbm.png", &|path, page| write_light_map_rgbm(path, page, range));
             }
         }
+        self.write_meshes(map, baked)?;
         // The range of RGBM is in the report.
         if writes(Format::Json) || writes(Format::Rgbm) {
-            let report = self.report(map, baked, shown);
-            self.output.write("json", format!("{report:#}\n").as_bytes());
+            self.output.write_report(self.report(map, baked, shown));
         }
+        Ok(())
+    }
+
+    /// Writes the scene with the map, and pictures of it.
+    fn write_meshes(&self, map: &LightMap, baked: &BakeResult) -> Result<(), Error> {
+        let writes = |format: Format| self.formats.contains(&format);
+        let path = |ending: &str| self.output.path(ending);
         if !writes(Format::Glb) && !writes(Format::Ply) && !writes(Format::Png) {
             return Ok(());
         }

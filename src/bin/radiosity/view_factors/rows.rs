@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use radiosity::io::view_factors::{read_rows, write_rows};
-use radiosity::ranks::Alone;
 use radiosity::view_factor::PartialMatrix;
+use radiosity::work::is_first;
 use radiosity::{Error, ErrorKind, Scene, ViewFactors};
 
 use super::{ToError, group_indices};
@@ -60,7 +60,7 @@ impl ToError {
         let second = Duration::from_secs(1);
         let (mut written, mut interval, mut failure) = (Instant::now(), second, None);
         let part = self.make(scene, &groups, rows, done, |part| {
-            if written.elapsed() > interval {
+            if is_first() && written.elapsed() > interval {
                 let start = Instant::now();
                 failure = write_rows(checkpoint, part).err();
                 // Writing takes a twentieth of the time at most.
@@ -75,7 +75,9 @@ impl ToError {
         if let Some(failure) = failure {
             return Err(failure.into());
         }
-        write_rows(checkpoint, &part)?;
+        if is_first() {
+            write_rows(checkpoint, &part)?;
+        }
         if interrupt::stopped() { Err(Stop::Interrupted) } else { Ok(part) }
     }
 
@@ -107,7 +109,7 @@ impl ToError {
                 report(done, of)?;
                 keep(part)
             };
-            PartialMatrix::make(scene, self.error, groups, rows, done, &mut Alone, told)
+            PartialMatrix::make(scene, self.error, groups, rows, done, told)
         })
     }
 }

@@ -1,0 +1,29 @@
+//! Long work on many items: in batches with progress between them, shared with other processes,
+//! kept in a journal.
+//!
+//! ```text
+//!                        ┌ in the journal ──────────────────────────────────┐
+//! items ─► Batches::next ┤                                                  ├─► results, in order
+//!                        └ else ─► alone: one batch, by all threads ────────┤
+//!                               └► ranks: parts of a batch, on demand, ─────┘
+//!                                         exchanged          └► appended to the journal
+//! ```
+//!
+//! All long loops of the crate are [`Batches`]. Who computes an item, and when, changes no result:
+//! every process runs the same program, and makes the same calls in the same order. What could make
+//! them differ is agreed upon: the ends of batches, the clock ([`now`]), and whether to go on
+//! ([`agree`]).
+//!
+//! Processes and a journal belong to the thread that runs the program, as the thread pool of rayon
+//! does: [`with_ranks`], [`with_journal`]. Functions in between know nothing of them.
+
+mod batches;
+mod journal;
+mod ranks;
+mod team;
+
+pub(crate) use batches::{Batches, map};
+pub use journal::{Journal, JournalPart};
+pub use ranks::{Alone, Ranks};
+pub(crate) use team::now;
+pub use team::{agree, alone, is_first, with_journal, with_ranks};

@@ -1,0 +1,162 @@
+//! A long list of like items, in batches of similar duration.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use rayon::prelude::*;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::team;
+use crate::progress::Instant;
+
+/// Batches grow or shrink towards this duration, so that progress is reported several times a
+/// second.
+const BATCH_DURATION: Duration = Duration::from_millis(250);
+
+/// Items of a part of [`map`], at least: a fraction of a millisecond. Plain choice.
+const ITEMS_OF_PART: usize = 512;
+
+/// Splits lists of like items into batches of similar duration, and has their results computed:
+/// here, by other processes, or in an earlier run. Results must not depend on batch ends, which
+/// follow the clock.
+pub(crate) struct Batches {
+    /// Items in the next batch, and in any but the last at least.
+    size: usize,
+    least: usize,
+    /// Number among the loops of the program; none in work that is shared as a whole.
+    number: Option<u64>,
+    /// Items done so far.
+    done: u64,
+}
+
+/// What cannot go wrong.
+#[derive(Debug, Serialize, Deserialize)]
+enum Never {}
+
+impl Batches {
+    /// The first batch has `first` items.
+    pub fn new(first: usize) -> Batches {
+        Batches { size: first.max(1), least: 1, number: team::next_loop(), done: 0 }
+    }
+
+    /// As many items at least, all but in the last batch: those that are done at once, each by one
+    /// thread.
+    pub fn at_least(self, least: usize) -> Batches {
+        Batches { size: self.size.max(least), least, ..self }
+    }
+
+    /// Takes the next batch off the front of `remaining`; returns it with its results, one for each
+    /// item. `work` is called for parts of the batch, in this process or in others.
+    pub fn next<'t, T, R: Serialize + DeserializeOwned>(
+        &mut self,
+        remaining: &mut &'t [T],
+        mut work: impl FnMut(&'t [T]) -> Vec<R>,
+    ) -> (&'t [T], Vec<R>) {
+        let Ok(done) = self.try_next(remaining, |part| Ok::<_, Never>(work(part)));
+        done
+    }
+
+    /// The same for work that may fail.
+    ///
+    /// # Errors
+    /// Those of `work`, in this process or another.
+    pub fn try_next<'t, T, R, E>(
+        &mut self,
+        remaining: &mut &'t [T],
+        mut work: impl FnMut(&'t [T]) -> Result<Vec<R>, E>,
+    ) -> Result<(&'t [T], Vec<R>), E>
+    where
+        R: Serialize + DeserializeOwned,
+        E: Serialize + DeserializeOwned,
+    {
+        let shared = self.number.and_then(|number| Some((number, team::borrow()?)));
+        let (count, results) = match shared {
+            Some((number, mut team)) => {
+                let kept = team.from_journal(number, self.done, remaining.len());
+                match kept {
+                    Some(results) => (results.len(), results),
+                    None => {
+                        // A process has its own first size.
+                        if self.done == 0 {
+                            self.size = team.largest(self.size);
+                        }
+                        let processes = team.processes();
+                        let count = remaining.len().min(self.size.saturating_mul(processes));
+                        let least = self.least.div_ceil(processes);
+                        let (results, duration) =
+                            team.share_out(count, least, &mut |part| work(&remaining[part]))?;
+                        self.adapt(duration, count == self.size.saturating_mul(processes));
+                        team.to_journal(number, self.done, &results);
+                        (count, results)
+                    }
+                }
+            }
+            None => {
+                let count = remaining.len().min(self.size);
+                let start = Instant::now();
+                let results = work(&remaining[..count])?;
+                self.adapt(start.elapsed(), count == self.size);
+                (count, results)
+            }
+        };
+        debug_assert_eq!(count, results.len(), "one result for each item");
+        self.done += count as u64;
+        let (batch, rest) = remaining.split_at(count);
+        *remaining = rest;
+        Ok((batch, results))
+    }
+
+    /// After a batch that took too long the next is half as large; after a full one that took less
+    /// than a third of [`BATCH_DURATION`], twice as large.
+    fn adapt(&mut self, duration: Duration, is_full: bool) {
+        if duration > BATCH_DURATION {
+            self.size = (self.size / 2).max(self.least);
+        } else if duration < BATCH_DURATION / 3 && is_full {
+            self.size *= 2;
+        }
+    }
+}
+
+/// The results of `work` for the numbers below `count`, in their order, by all threads and
+/// processes. They are not kept in a journal. Worth it where an item takes longer than to exchange its result: some tens of nanoseconds.
+pub(crate) fn map<R: Send + Serialize + DeserializeOwned>(
+    count: usize,
+    work: impl Fn(usize) -> R + Sync,
+) -> Vec<R> {
+    match team::borrow() {
+        Some(mut team) if team.processes() > 1 => {
+            let work = &mut |part: Range<usize>| -> Result<Vec<R>, Never> {
+                Ok(part.into_par_iter().map(&work).collect())
+            };
+            let Ok((results, _)) = team.share_out(count, ITEMS_OF_PART, work);
+            results
+        }
+        _ => (0..count).into_par_iter().map(&work).collect(),
+    }
+}
+
+/// A copy is a loop of its own.
+impl Clone for Batches {
+    fn clone(&self) -> Batches {
+        Batches { number: team::next_loop(), done: 0, ..*self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Batches;
+
+    #[test]
+    fn batches_cover_all_items_once_in_order() {
+        let items: Vec<u32> = (0..1000).collect();
+        let (mut remaining, mut done) = (&items[..], vec![]);
+        let mut batches = Batches::new(3);
+        while !remaining.is_empty() {
+            let (batch, results) = batches.next(&mut remaining, |batch| batch.to_vec());
+            assert_eq!(batch, results);
+            done.extend(results);
+        }
+        assert_eq!(done, items);
+    }
+}

@@ -1,0 +1,247 @@
+//! Results of long loops in a file, for a program that goes on where it was killed.
+//!
+//! ```text
+//! 8 bytes "radilog", version                                          MAGIC
+//! record: what the work is of, names and hashes
+//! record: loop, first item, results    )
+//! record: …                            )  in the order in which they were made
+//!
+//! a record is  4 bytes length · content, postcard · 8 bytes XXH3-64 of both
+//! ```
+//!
+//! Loops have the numbers in which they began; the program that resumes begins the same loops in
+//! the same order, since it has the same input. Batches may end elsewhere. A record that was being
+//! written when the program was killed is cut off.
+
+use std::collections::HashMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::error::{Error, ErrorKind, quoted};
+use crate::progress::Instant;
+
+/// Begins every file; the last byte is the version.
+const MAGIC: &[u8; 8] = b"radilog\x01";
+
+/// Records are written when as many bytes are there, or after as long: a kill costs no more.
+const BUFFER: usize = 1 << 22;
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// Results of long loops in a file.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+    /// Bytes that are not in the file yet.
+    buffer: Vec<u8>,
+    written: Instant,
+    /// Where the results of a loop from an item on are: start and number of bytes.
+    records: HashMap<(u64, u64), (u64, usize)>,
+    failure: Option<Error>,
+}
+
+/// What the results of a journal depend on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JournalPart {
+    /// Such as "scene".
+    pub name: String,
+    /// Hash of it.
+    pub hash: u64,
+}
+
+impl Journal {
+    /// The journal at `path` of work that depends on `parts`: that which is there, or a new one.
+    ///
+    /// # Errors
+    /// [`ErrorKind::File`] when the file cannot be read or written, is none of these, or is of
+    /// other parts, which it names.
+    pub fn open(path: impl AsRef<Path>, parts: &[JournalPart]) -> Result<Journal, Error> {
+        let path = path.as_ref();
+        let failed = |error: io::Error| file_error(path, &error);
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .map_err(failed)?;
+        let mut records = HashMap::new();
+        let mut reader = Reader { input: io::BufReader::new(&mut file), at: 0 };
+        let mut magic = [0; MAGIC.len()];
+        let whole = match reader.read(&mut magic).map_err(failed)? {
+            false => 0,
+            true if magic != *MAGIC => {
+                let found = "not a state of a bake, or that of another version";
+                return Err(refuse(path, found));
+            }
+            true => {
+                let mut whole = 0;
+                while let Some((start, content)) = reader.record().map_err(failed)? {
+                    if whole == 0 {
+                        check_parts(path, &content, parts)?;
+                    } else if let Ok(((number, first), results)) =
+                        postcard::take_from_bytes::<(u64, u64)>(&content)
+                    {
+                        let skipped = content.len() - results.len();
+                        records
+                            .insert((number, first), (start + skipped as u64, results.len()));
+                    }
+                    whole = reader.at;
+                }
+                whole
+            }
+        };
+        let mut journal = Journal {
+            path: path.into(),
+            file,
+            buffer: vec![],
+            written: Instant::now(),
+            records,
+            failure: None,
+        };
+        // What was torn off when the program was killed.
+        journal.file.set_len(whole).map_err(failed)?;
+        journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
+        if whole == 0 {
+            journal.buffer.extend(MAGIC);
+            let parts: Vec<&JournalPart> = parts.iter().collect();
+            journal.push(&postcard::to_extend(&parts, vec![]).expect("a vector takes all bytes"));
+            journal.flush();
+        }
+        match journal.failure.take() {
+            Some(error) => Err(error),
+            None => Ok(journal),
+        }
+    }
+
+    /// Whether it has results that were not taken.
+    pub(super) fn has_records(&self) -> bool {
+        !self.records.is_empty()
+    }
+
+    /// The bytes of the results of loop `number` from item `first` on, once.
+    pub(super) fn take(&mut self, number: u64, first: u64) -> Option<Vec<u8>> {
+        let (start, len) = self.records.remove(&(number, first))?;
+        let mut bytes = vec![0; len];
+        let read = self.file.seek(SeekFrom::Start(start)).and_then(|_| {
+            self.file.read_exact(&mut bytes)?;
+            self.file.seek(SeekFrom::End(0))
+        });
+        read.ok().map(|_| bytes)
+    }
+
+    /// Appends the bytes of results.
+    pub(super) fn append(&mut self, number: u64, first: u64, results: &[u8]) {
+        let mut content = postcard::to_extend(&(number, first), Vec::with_capacity(32))
+            .expect("a vector takes all bytes");
+        content.extend(results);
+        self.push(&content);
+        if self.buffer.len() >= BUFFER || self.written.elapsed() >= INTERVAL {
+            self.flush();
+        }
+    }
+
+    fn push(&mut self, content: &[u8]) {
+        let length = (content.len() as u32).to_le_bytes();
+        self.buffer.extend(length);
+        self.buffer.extend(content);
+        self.buffer.extend(checksum(&length, content));
+    }
+
+    /// Writes what is not in the file yet. A failure is kept: work goes on without a journal.
+    fn flush(&mut self) {
+        if self.failure.is_none()
+            && let Err(error) = self.file.write_all(&self.buffer)
+        {
+            self.failure = Some(file_error(&self.path, &error));
+        }
+        self.buffer.clear();
+        self.written = Instant::now();
+    }
+
+    /// Writes all that there is.
+    ///
+    /// # Errors
+    /// [`ErrorKind::File`] if something could not be written, now or before.
+    pub fn finish(mut self) -> Result<(), Error> {
+        self.flush();
+        self.failure.take().map_or(Ok(()), Err)
+    }
+}
+
+impl Drop for Journal {
+    fn drop(&mut self) {
+        self.flush();
+    }
+}
+
+/// Reads records one after the other.
+struct Reader<R> {
+    input: R,
+    at: u64,
+}
+
+impl<R: Read> Reader<R> {
+    /// Fills `bytes`, unless the input ends before.
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<bool> {
+        match self.input.read_exact(bytes) {
+            Ok(()) => {
+                self.at += bytes.len() as u64;
+                Ok(true)
+            }
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Start and content of the next record, if it is whole.
+    fn record(&mut self) -> io::Result<Option<(u64, Vec<u8>)>> {
+        let mut length = [0; 4];
+        if !self.read(&mut length)? {
+            return Ok(None);
+        }
+        let start = self.at;
+        // A length that is damaged may be any.
+        let mut content = vec![];
+        let wanted = u64::from(u32::from_le_bytes(length));
+        let read = self.input.by_ref().take(wanted).read_to_end(&mut content)? as u64;
+        self.at += read;
+        let mut sum = [0; 8];
+        let is_whole = read == wanted && self.read(&mut sum)? && sum == checksum(&length, &content);
+        Ok(is_whole.then_some((start, content)))
+    }
+}
+
+fn checksum(length: &[u8; 4], content: &[u8]) -> [u8; 8] {
+    let mut hash = Xxh3::new();
+    hash.update(length);
+    hash.update(content);
+    hash.digest().to_le_bytes()
+}
+
+fn check_parts(path: &Path, content: &[u8], parts: &[JournalPart]) -> Result<(), Error> {
+    let Ok(found) = postcard::from_bytes::<Vec<JournalPart>>(content) else {
+        return Err(refuse(path, "damaged"));
+    };
+    let other: Vec<&str> =
+        parts.iter().filter(|part| !found.contains(part)).map(|part| &part.name[..]).collect();
+    if other.is_empty() && found.len() == parts.len() {
+        return Ok(());
+    }
+    Err(refuse(path, &format!("the state of other work: other {}", quoted(&other))))
+}
+
+fn refuse(path: &Path, found: &str) -> Error {
+    let remedy = "give the command that wrote it again, or the name of a new file";
+    Error::new(ErrorKind::File, path.display().to_string(), found, remedy)
+}
+
+fn file_error(path: &Path, error: &io::Error) -> Error {
+    let remedy = "name a file in a folder that can be written to and has room";
+    Error::new(ErrorKind::File, path.display().to_string(), error.to_string(), remedy)
+}

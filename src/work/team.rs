@@ -1,0 +1,298 @@
+//! The processes and the journal of the program that runs in a thread.
+
+use std::cell::RefCell;
+use std::ops::{ControlFlow, Deref, DerefMut, Range};
+use std::time::Duration;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::journal::Journal;
+use super::ranks::{Alone, Ranks};
+use crate::progress::Instant;
+
+thread_local! {
+    static TEAM: RefCell<Option<Box<Team>>> = const { RefCell::new(None) };
+}
+
+/// Processes, a journal, and what all processes agree upon.
+pub(super) struct Team {
+    ranks: Box<dyn Ranks>,
+    journal: Option<Journal>,
+    /// Whether process 0 has records of the journal that were not used yet.
+    replays: bool,
+    /// Loops that began so far.
+    loops: u64,
+    /// Numbers that were taken before this batch.
+    taken: u64,
+    /// When this process began to work with others.
+    start: Instant,
+    /// The clock of process 0 at the last exchange, since its start.
+    agreed: Duration,
+}
+
+/// What a process says of itself in every exchange.
+#[derive(Serialize, Deserialize)]
+struct Report {
+    clock: Duration,
+    /// Time that it worked for the batch.
+    busy: Duration,
+}
+
+/// Runs `work`, all long loops of which are shared with other processes that run the same.
+pub fn with_ranks<T>(ranks: Box<dyn Ranks>, work: impl FnOnce() -> T) -> T {
+    let before = TEAM.replace(Some(Box::new(Team::new(ranks))));
+    let done = work();
+    TEAM.set(before);
+    done
+}
+
+/// Runs `work`, with the results of all its long loops in `journal`: those that are there are
+/// not computed again, and others are appended. Of several processes the first has the journal,
+/// others give none.
+pub fn with_journal<T>(journal: &mut Option<Journal>, work: impl FnOnce() -> T) -> T {
+    let with = || {
+        if let Some(mut team) = borrow() {
+            team.keep(journal.take());
+        }
+        let done = work();
+        if let Some(mut team) = borrow() {
+            *journal = team.journal.take();
+            team.keep(None);
+        }
+        done
+    };
+    match TEAM.with_borrow(Option::is_some) {
+        true => with(),
+        false => with_ranks(Box::new(Alone::default()), with),
+    }
+}
+
+/// Runs `work` in this process alone, as for what only the first does.
+pub fn alone<T>(work: impl FnOnce() -> T) -> T {
+    let _kept = borrow();
+    work()
+}
+
+/// Whether this process is the first, which prints and writes.
+pub fn is_first() -> bool {
+    borrow().is_none_or(|team| team.ranks.rank() == 0)
+}
+
+/// The time by which work is ended: with other processes that of the last exchange.
+pub(crate) fn now() -> Instant {
+    match borrow() {
+        Some(team) if team.processes() > 1 => team.start + team.agreed,
+        _ => Instant::now(),
+    }
+}
+
+/// Whether to go on, by what this process and all others say: a break of one stops all.
+pub fn agree(flow: ControlFlow<()>) -> ControlFlow<()> {
+    match borrow() {
+        Some(mut team) if team.processes() > 1 => {
+            let breaks = team.exchange(Duration::ZERO, &flow.is_break()).1;
+            if breaks.contains(&true) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+        _ => flow,
+    }
+}
+
+/// The number of a loop that begins.
+pub(super) fn next_loop() -> Option<u64> {
+    let mut team = borrow()?;
+    team.loops += 1;
+    Some(team.loops)
+}
+
+/// The team of this thread, if it has one that is not in use: what is shared as a whole has no
+/// parts that are shared.
+pub(super) fn borrow() -> Option<Borrowed> {
+    TEAM.take().map(|team| Borrowed(Some(team)))
+}
+
+/// A team in use.
+pub(super) struct Borrowed(Option<Box<Team>>);
+
+impl Drop for Borrowed {
+    fn drop(&mut self) {
+        TEAM.set(self.0.take());
+    }
+}
+
+impl Deref for Borrowed {
+    type Target = Team;
+
+    fn deref(&self) -> &Team {
+        self.0.as_ref().expect("it is given back when dropped")
+    }
+}
+
+impl DerefMut for Borrowed {
+    fn deref_mut(&mut self) -> &mut Team {
+        self.0.as_mut().expect("it is given back when dropped")
+    }
+}
+
+impl Team {
+    fn new(ranks: Box<dyn Ranks>) -> Team {
+        Team {
+            ranks,
+            journal: None,
+            replays: false,
+            loops: 0,
+            taken: 0,
+            start: Instant::now(),
+            agreed: Duration::ZERO,
+        }
+    }
+
+    pub fn processes(&self) -> usize {
+        self.ranks.size()
+    }
+
+    /// The largest of the sizes of all processes.
+    pub fn largest(&mut self, size: usize) -> usize {
+        let sizes = self.exchange(Duration::ZERO, &(size as u64)).1;
+        sizes.into_iter().max().unwrap_or(1) as usize
+    }
+
+    /// Keeps results in `journal` from here on. Its loops are counted from here.
+    fn keep(&mut self, journal: Option<Journal>) {
+        self.loops = 0;
+        self.journal = journal;
+        let has_records = self.journal.as_ref().is_some_and(Journal::has_records);
+        self.replays = self.exchange(Duration::ZERO, &has_records).1[0];
+    }
+
+    /// The results that the journal has of loop `number` from item `first` on, of `count` at most.
+    pub fn from_journal<R: DeserializeOwned>(
+        &mut self,
+        number: u64,
+        first: u64,
+        count: usize,
+    ) -> Option<Vec<R>> {
+        if !self.replays {
+            return None;
+        }
+        let record = self.journal.as_mut().and_then(|journal| journal.take(number, first));
+        self.replays = false;
+        let more = self.journal.as_ref().is_some_and(Journal::has_records);
+        let (record, more) = match self.processes() {
+            1 => (record, more),
+            _ => self.exchange(Duration::ZERO, &(record, more)).1.swap_remove(0),
+        };
+        self.replays = more;
+        let results: Vec<R> = postcard::from_bytes(&record?).ok()?;
+        (1..=count).contains(&results.len()).then_some(results)
+    }
+
+    /// Appends the results of loop `number` from item `first` on.
+    pub fn to_journal<R: Serialize>(&mut self, number: u64, first: u64, results: &[R]) {
+        if let Some(journal) = &mut self.journal {
+            journal.append(number, first, &bytes_of(&results));
+        }
+    }
+
+    /// The results of `work` for `count` items, one each, and the mean time that a process worked.
+    /// Parts of at least `least` items are taken by whichever process is free, the larger ones
+    /// first.
+    ///
+    /// # Errors
+    /// That of the first process that has one.
+    pub fn share_out<R, E>(
+        &mut self,
+        count: usize,
+        least: usize,
+        work: &mut dyn FnMut(Range<usize>) -> Result<Vec<R>, E>,
+    ) -> Result<(Vec<R>, Duration), E>
+    where
+        R: Serialize + DeserializeOwned,
+        E: Serialize + DeserializeOwned,
+    {
+        let processes = self.processes();
+        let start = Instant::now();
+        if processes == 1 {
+            let results = work(0..count)?;
+            return Ok((results, start.elapsed()));
+        }
+        let parts = parts(count, processes, least);
+        let mut own: Result<Vec<(u32, Vec<R>)>, E> = Ok(vec![]);
+        // Each process takes one number past the last.
+        let first = self.taken;
+        self.taken += (parts.len() + processes) as u64;
+        loop {
+            let k = (self.ranks.take() - first) as usize;
+            let (Some(part), Ok(done)) = (parts.get(k), &mut own) else {
+                if k < parts.len() {
+                    continue;
+                }
+                break;
+            };
+            match work(part.clone()) {
+                Ok(results) => done.push((k as u32, results)),
+                Err(error) => own = Err(error),
+            }
+        }
+        let (busy, of_all) = self.exchange(start.elapsed(), &own);
+        let mut by_part: Vec<(u32, Vec<R>)> = vec![];
+        for results in of_all {
+            by_part.extend(results?);
+        }
+        by_part.sort_unstable_by_key(|(part, _)| *part);
+        Ok((by_part.into_iter().flat_map(|(_, results)| results).collect(), busy))
+    }
+
+    /// What all processes say, by rank, and the mean time that they worked.
+    fn exchange<M: Serialize + DeserializeOwned>(
+        &mut self,
+        busy: Duration,
+        message: &M,
+    ) -> (Duration, Vec<M>) {
+        let report = Report { clock: self.start.elapsed(), busy };
+        let all = self.ranks.all_gather(&bytes_of(&(report, message)));
+        let decoded = |bytes: &Vec<u8>| -> (Report, M) {
+            postcard::from_bytes(bytes).expect("all processes run the same program")
+        };
+        let (reports, messages): (Vec<Report>, Vec<M>) = all.iter().map(decoded).unzip();
+        self.agreed = reports[0].clock;
+        let busy = reports.iter().map(|report| report.busy).sum::<Duration>();
+        (busy / reports.len() as u32, messages)
+    }
+}
+
+/// The parts of `count` items for `processes` that take them on demand: half of an even share of
+/// what is left, `least` at the end.
+///
+/// Source: Polychronopoulos, Kuck 1987, guided self-scheduling; with half of its parts, since items
+/// differ.
+fn parts(count: usize, processes: usize, least: usize) -> Vec<Range<usize>> {
+    let mut parts = vec![];
+    let mut start = 0;
+    while start < count {
+        let part = ((count - start) / (2 * processes)).max(least.max(1)).min(count - start);
+        parts.push(start..start + part);
+        start += part;
+    }
+    parts
+}
+
+fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
+    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parts;
+
+    #[test]
+    fn parts_cover_all_items_once_the_larger_first() {
+        for (count, processes, least) in [(1, 2, 1), (1000, 2, 1), (1000, 64, 8), (7, 3, 100)] {
+            let parts = parts(count, processes, least);
+            let items: Vec<usize> = parts.iter().cloned().flatten().collect();
+            assert!(items.into_iter().eq(0..count));
+            assert!(parts.is_sorted_by(|a, b| a.len() >= b.len()));
+            assert!(parts[0].len() <= least.max(count.div_ceil(2 * processes)));
+        }
+    }
+}
