@@ -26,4 +26,4 @@ pub(crate) use batches::{Batches, map};
 pub use journal::{Journal, JournalPart};
 pub use ranks::{Alone, Ranks};
 pub(crate) use team::now;
-pub use team::{agree, alone, is_first, with_journal, with_ranks};
+pub use team::{agree, alone, from_first, is_first, with_journal, with_ranks};

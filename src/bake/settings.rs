@@ -1,6 +1,5 @@
 //! All settings of a bake, and which of them an error asks for.
 
-
 use crate::accuracy::Measure;
 use crate::accuracy::hidden::LitRegion;
 use crate::bake::light_survey::LightSurvey;

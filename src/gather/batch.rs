@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::IrradianceSample;
 use super::directional_light::{Direct, DirectionalLight};
 use super::gather_points::VertexGatherPoints;
-use super::IrradianceSample;
 use crate::accuracy::hidden::LitRegion;
 use crate::scene::Rgb;
 

@@ -63,7 +63,7 @@ impl<'a> VertexRows<'a> {
 
     /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
     /// rays; none if `progress`, called after each batch with the number done, breaks.
-    pub fn map<T: Send + Serialize + DeserializeOwned>(
+    pub fn map<T: Send + Sync + Serialize + DeserializeOwned>(
         &self,
         vertices: &[u32],
         parts: u32,

@@ -124,7 +124,7 @@ pub(super) fn make(
 
 /// The results of `work` for all `items`, in parallel; `None` if stopped. `told` is the range of
 /// progress: items done before, and the total.
-fn in_batches<R: Send + Serialize + DeserializeOwned>(
+fn in_batches<R: Send + Sync + Serialize + DeserializeOwned>(
     items: &[u32],
     making: &mut Making,
     told: Range<usize>,
@@ -135,8 +135,8 @@ fn in_batches<R: Send + Serialize + DeserializeOwned>(
     // A polygon is done by one thread.
     let mut batches = Batches::new(BATCH).at_least(2 * rayon::current_num_threads());
     while !remaining.is_empty() {
-        let (_, made) = batches
-            .next(&mut remaining, |batch| batch.par_iter().map(&work).collect::<Vec<R>>());
+        let (_, made) =
+            batches.next(&mut remaining, |batch| batch.par_iter().map(&work).collect::<Vec<R>>());
         results.extend(made);
         let count = items.len();
         making.report((told.start + results.len()) * count / told.end, count)?;

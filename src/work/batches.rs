@@ -48,7 +48,7 @@ impl Batches {
 
     /// Takes the next batch off the front of `remaining`; returns it with its results, one for each
     /// item. `work` is called for parts of the batch, in this process or in others.
-    pub fn next<'t, T, R: Serialize + DeserializeOwned>(
+    pub fn next<'t, T, R: Sync + Serialize + DeserializeOwned>(
         &mut self,
         remaining: &mut &'t [T],
         mut work: impl FnMut(&'t [T]) -> Vec<R>,
@@ -67,7 +67,7 @@ impl Batches {
         mut work: impl FnMut(&'t [T]) -> Result<Vec<R>, E>,
     ) -> Result<(&'t [T], Vec<R>), E>
     where
-        R: Serialize + DeserializeOwned,
+        R: Sync + Serialize + DeserializeOwned,
         E: Serialize + DeserializeOwned,
     {
         let shared = self.number.and_then(|number| Some((number, team::borrow()?)));

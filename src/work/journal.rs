@@ -6,7 +6,7 @@
 //! record: loop, first item, results    )
 //! record: …                            )  in the order in which they were made
 //!
-//! a record is  4 bytes length · content, postcard · 8 bytes XXH3-64 of both
+//! a record is  8 bytes length · content, postcard · 8 bytes XXH3-64 of both
 //! ```
 //!
 //! Loops have the numbers in which they began; the program that resumes begins the same loops in
@@ -19,14 +19,18 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::Xxh3;
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::error::{Error, ErrorKind, quoted};
 use crate::progress::Instant;
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radilog\x01";
+
+/// Bytes of the length of a record.
+const LENGTH: usize = 8;
 
 /// Records are written when as many bytes are there, or after as long: a kill costs no more.
 const BUFFER: usize = 1 << 22;
@@ -88,8 +92,7 @@ impl Journal {
                         postcard::take_from_bytes::<(u64, u64)>(&content)
                     {
                         let skipped = content.len() - results.len();
-                        records
-                            .insert((number, first), (start + skipped as u64, results.len()));
+                        records.insert((number, first), (start + skipped as u64, results.len()));
                     }
                     whole = reader.at;
                 }
@@ -109,8 +112,7 @@ impl Journal {
         journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
         if whole == 0 {
             journal.buffer.extend(MAGIC);
-            let parts: Vec<&JournalPart> = parts.iter().collect();
-            journal.push(&postcard::to_extend(&parts, vec![]).expect("a vector takes all bytes"));
+            journal.buffer.extend(record(&parts));
             journal.flush();
         }
         match journal.failure.take() {
@@ -135,22 +137,16 @@ impl Journal {
         read.ok().map(|_| bytes)
     }
 
-    /// Appends the bytes of results.
-    pub(super) fn append(&mut self, number: u64, first: u64, results: &[u8]) {
-        let mut content = postcard::to_extend(&(number, first), Vec::with_capacity(32))
-            .expect("a vector takes all bytes");
-        content.extend(results);
-        self.push(&content);
+    /// Appends the results of loop `number` from item `first` on: by a record a thread, since others
+    /// wait.
+    pub(super) fn append<R: Serialize + Sync>(&mut self, number: u64, first: u64, results: &[R]) {
+        let len = results.len().div_ceil(rayon::current_num_threads()).max(1);
+        let of_part = |(k, part): (usize, &[R])| record(&(number, first + (k * len) as u64, part));
+        let records: Vec<Vec<u8>> = results.par_chunks(len).enumerate().map(of_part).collect();
+        records.iter().for_each(|record| self.buffer.extend(record));
         if self.buffer.len() >= BUFFER || self.written.elapsed() >= INTERVAL {
             self.flush();
         }
-    }
-
-    fn push(&mut self, content: &[u8]) {
-        let length = (content.len() as u32).to_le_bytes();
-        self.buffer.extend(length);
-        self.buffer.extend(content);
-        self.buffer.extend(checksum(&length, content));
     }
 
     /// Writes what is not in the file yet. A failure is kept: work goes on without a journal.
@@ -201,27 +197,31 @@ impl<R: Read> Reader<R> {
 
     /// Start and content of the next record, if it is whole.
     fn record(&mut self) -> io::Result<Option<(u64, Vec<u8>)>> {
-        let mut length = [0; 4];
+        let mut length = [0; LENGTH];
         if !self.read(&mut length)? {
             return Ok(None);
         }
         let start = self.at;
         // A length that is damaged may be any.
-        let mut content = vec![];
-        let wanted = u64::from(u32::from_le_bytes(length));
-        let read = self.input.by_ref().take(wanted).read_to_end(&mut content)? as u64;
+        let mut bytes = length.to_vec();
+        let wanted = u64::from_le_bytes(length);
+        let read = self.input.by_ref().take(wanted).read_to_end(&mut bytes)? as u64;
         self.at += read;
         let mut sum = [0; 8];
-        let is_whole = read == wanted && self.read(&mut sum)? && sum == checksum(&length, &content);
-        Ok(is_whole.then_some((start, content)))
+        let is_whole =
+            read == wanted && self.read(&mut sum)? && sum == xxh3_64(&bytes).to_le_bytes();
+        Ok(is_whole.then(|| (start, bytes.split_off(LENGTH))))
     }
 }
 
-fn checksum(length: &[u8; 4], content: &[u8]) -> [u8; 8] {
-    let mut hash = Xxh3::new();
-    hash.update(length);
-    hash.update(content);
-    hash.digest().to_le_bytes()
+/// `content` as a record.
+fn record(content: &(impl Serialize + ?Sized)) -> Vec<u8> {
+    let bytes = postcard::to_extend(content, vec![0; LENGTH]);
+    let mut bytes = bytes.expect("a vector takes all bytes");
+    let length = (bytes.len() - LENGTH) as u64;
+    bytes[..LENGTH].copy_from_slice(&length.to_le_bytes());
+    bytes.extend(xxh3_64(&bytes).to_le_bytes());
+    bytes
 }
 
 fn check_parts(path: &Path, content: &[u8], parts: &[JournalPart]) -> Result<(), Error> {

@@ -68,6 +68,25 @@ pub fn with_journal<T>(journal: &mut Option<Journal>, work: impl FnOnce() -> T) 
     }
 }
 
+/// What `work` makes in the first process, in all of them: what only that one can read.
+///
+/// # Errors
+/// Those of `work`.
+pub fn from_first<R, E>(work: impl FnOnce() -> Result<R, E>) -> Result<R, E>
+where
+    R: Serialize + DeserializeOwned,
+    E: Serialize + DeserializeOwned,
+{
+    match borrow() {
+        Some(mut team) if team.processes() > 1 => {
+            let made = (team.ranks.rank() == 0).then(work);
+            let all = team.exchange(Duration::ZERO, &made).1;
+            all.into_iter().flatten().next().expect("the first process has it")
+        }
+        _ => work(),
+    }
+}
+
 /// Runs `work` in this process alone, as for what only the first does.
 pub fn alone<T>(work: impl FnOnce() -> T) -> T {
     let _kept = borrow();
@@ -188,9 +207,9 @@ impl Team {
     }
 
     /// Appends the results of loop `number` from item `first` on.
-    pub fn to_journal<R: Serialize>(&mut self, number: u64, first: u64, results: &[R]) {
+    pub fn to_journal<R: Serialize + Sync>(&mut self, number: u64, first: u64, results: &[R]) {
         if let Some(journal) = &mut self.journal {
-            journal.append(number, first, &bytes_of(&results));
+            journal.append(number, first, results);
         }
     }
 

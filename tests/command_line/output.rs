@@ -1,7 +1,8 @@
 //! Where `--out` puts files, and what is said of them.
 
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use radiosity::glam::DVec3;
 
@@ -165,4 +166,77 @@ fn a_full_disk_leaves_the_files_that_were_there() {
         assert!(error.lines().any(|line| line.contains(name)), "{name}: {error}");
     }
     assert!(contents(folder.path()) == old);
+}
+
+#[test]
+fn files_of_another_run_than_their_report_are_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let info = |report: &str| run("info", &[place(report).to_str().unwrap()]);
+    for (command, options, report) in [
+        ("bake", &["--write", "ply,json"][..], "lit.json"),
+        ("light-map", &["--size", "16", "--write", "exr,json"], "lit.light-map.json"),
+    ] {
+        let stem = place("lit").display().to_string();
+        let stem = stem + if command == "bake" { "" } else { ".light-map" };
+        let files = written(folder.path(), command, &stem, options);
+        assert_eq!(files.last().unwrap(), &place(report).display().to_string(), "written last");
+        let same = info(report);
+        assert!(same.status.success(), "{:?}", texts(&same));
+        // As a kill leaves them after the first file of another run.
+        let first = std::fs::read(&files[0]).unwrap();
+        std::fs::write(&files[0], [&first[..first.len() - 1], b"~"].concat()).unwrap();
+        let other = info(report);
+        let [said, told] = texts(&other);
+        assert_eq!(other.status.code(), Some(3));
+        assert!(said.contains("another of the same size") && told.contains("1 of "), "{said}");
+        std::fs::remove_file(&files[0]).unwrap();
+        assert!(texts(&info(report))[0].contains("missing"));
+    }
+    std::fs::write(place("other.json"), "{}").unwrap();
+    assert!(texts(&info("other.json"))[1].contains("names no files"));
+}
+
+/// The output of the program with `input` on its standard input.
+fn piped(args: &[&str], input: &[u8]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+    command.args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    child.stdin.take().unwrap().write_all(input).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn a_dash_is_standard_input_and_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    fn bake<'a>(scene: &'a str, out: &'a str) -> Vec<&'a str> {
+        vec!["bake", scene, "--cpu", "--error", "0.5", "--emit", "lamp=5,5,5", "--out", out]
+    }
+    // What is sent has no folder, in which a material library could be.
+    let plates = std::fs::read_to_string(lit_plates(folder.path())).unwrap();
+    let plates = plates.replace("mtllib lit.mtl", "");
+    let scene = write(folder.path(), "plates.obj", &plates).display().to_string();
+    let file = place("file");
+    let args = [bake(&scene, &file), vec!["--write", "ply,glb"]].concat();
+    assert!(piped(&args, b"").status.success());
+    let expected = std::fs::read(place("file.ply")).unwrap();
+    let through = piped(&bake("-", "-"), plates.as_bytes());
+    assert!(through.status.success() && through.stdout == expected);
+    assert!(texts(&through)[1].contains("about"), "the summary is elsewhere");
+    // A binary glTF file, which has no ending either; and files that are named after nothing.
+    let glb = std::fs::read(place("file.glb")).unwrap();
+    let again = place("again");
+    let read = piped(&["bake", "-", "--cpu", "--error", "0.5", "--out", &again], &glb);
+    assert!(read.status.success(), "{:?}", texts(&read));
+    assert!(Path::new(&place("again.glb")).is_file());
+    let stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+               endloop\nendfacet\nendsolid a\n";
+    let inside = folder.path().display().to_string();
+    let read = piped(&["bake", "-", "--cpu", "--error", "0.5", "--out", &inside], stl.as_bytes());
+    assert!(Path::new(&place("stdin.ply")).is_file(), "{:?}", texts(&read));
+    let grid = run("grid", &[cornell(), "--cpu", "--out", "-"]);
+    assert!(texts(&grid)[1].contains("--out -"));
+    let nothing = piped(&bake("-", "-"), b"");
+    assert!(!nothing.status.success() && texts(&nothing)[1].contains("standard input"));
 }

@@ -52,14 +52,13 @@ fn what_was_stopped_goes_on() {
     for (scene, absent) in scenes() {
         let n = scene.groups().len();
         let mut told = 0;
-        let stopped =
-            PartialMatrix::make(&scene, ERROR, &[], 0..n, None, |part, _, _| {
-                told += 1;
-                match part.missing().len() < n {
-                    true => ControlFlow::Break(()),
-                    false => ControlFlow::Continue(()),
-                }
-            });
+        let stopped = PartialMatrix::make(&scene, ERROR, &[], 0..n, None, |part, _, _| {
+            told += 1;
+            match part.missing().len() < n {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        });
         let stopped = stopped.unwrap();
         let left = stopped.missing().len();
         assert!(left > 0 && left < n && told > 0, "{left} of {n}");
@@ -88,11 +87,10 @@ fn one_process_stops_all() {
     let (scene, _) = &scenes()[1];
     let left = in_processes(2, |rank| {
         let stops = rank == 1;
-        let part =
-            PartialMatrix::make(scene, ERROR, &[], 0..5, None, |_, _, _| match stops {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            });
+        let part = PartialMatrix::make(scene, ERROR, &[], 0..5, None, |_, _, _| match stops {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        });
         part.unwrap().missing().len()
     });
     // It is told so after the first rays, before there is a row.

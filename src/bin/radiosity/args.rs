@@ -11,7 +11,7 @@ use radiosity::backend::AdapterKind;
 use radiosity::work::is_first;
 use radiosity::{Backend, Error, ErrorKind, Rgb, io};
 
-use crate::{interrupt, progress};
+use crate::{interrupt, progress, standard};
 
 /// Why a command ended without having done its work.
 pub enum Stop {
@@ -163,12 +163,22 @@ pub struct Output {
 }
 
 impl Output {
+    /// Whether standard output takes the place of files.
+    pub fn is_dash(&self) -> bool {
+        self.out.as_deref().is_some_and(standard::is_dash)
+    }
+
     /// Names the files as `default` is where they are given no name, and checks whether they can be
     /// written before any work is done for them.
     ///
     /// # Errors
     /// Those of [`check_writable`].
     pub fn name(&mut self, default: PathBuf, endings: &[&str]) -> Result<(), Error> {
+        if self.is_dash() {
+            let (found, remedy) =
+                ("of standard output is the PLY file of a bake alone", "name files");
+            return Err(Error::new(ErrorKind::Setting, "--out -", found, remedy));
+        }
         self.stem = stem(self.out.take(), default, endings);
         check_writable(&self.stem)
     }

@@ -8,7 +8,7 @@ use radiosity::io::read_cameras;
 use radiosity::{Camera, Error, ErrorKind, GatheredMesh};
 
 use crate::args::{self, Parsed, give};
-use crate::progress;
+use crate::{progress, standard};
 
 #[derive(Args)]
 pub struct CameraOption {
@@ -59,7 +59,7 @@ impl CameraOption {
 
     /// The camera of the file with this name, or its first one.
     fn of_file(&self, scene: &Path, wanted: Option<&str>) -> Result<Option<Camera>, Error> {
-        let cameras = read_cameras(scene).or_else(|e| match wanted {
+        let cameras = standard::input(scene).and_then(read_cameras).or_else(|e| match wanted {
             Some(_) => Err(e),
             // It is said when the scene is read.
             None => Ok(vec![]),

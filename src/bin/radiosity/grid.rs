@@ -17,7 +17,7 @@ use radiosity::{Error, ErrorKind, Scene};
 use crate::args::{self, Output, Parsed, Stop, numbers, value};
 use crate::canvas::scale::Scale;
 use crate::light::{Light, LightOptions};
-use crate::progress;
+use crate::{progress, standard};
 
 /// A length for people.
 const METRES: &str = "a length in metres";
@@ -101,7 +101,7 @@ type Placed = (String, MeasuringGrid);
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        self.output.name(self.scene.with_extension(""), &["csv", "png"])?;
+        self.output.name(standard::stem(&self.scene), &["csv", "png"])?;
         self.light.reading.needs_up = self.planes.is_empty() || self.weather.is_some();
         if self.weather.is_some() {
             self.light.reading.sky.be_of_weather()?;

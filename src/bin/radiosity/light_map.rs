@@ -17,9 +17,9 @@ use crate::args::{
 };
 use crate::bake::files::SAMPLES;
 use crate::camera_option::CameraOption;
-use crate::progress;
 use crate::scene_options::{Input, SceneOptions};
 use crate::viewer_options::ViewerOptions;
+use crate::{progress, standard};
 
 /// Maximum number of texels along a side where the error asked for says how many.
 const MAX_PIXELS: u32 = 2048;
@@ -171,7 +171,8 @@ impl Options {
         self.viewer.check()?;
         self.binding()?;
         let endings = args::names(FORMATS);
-        self.output.name(self.scene.with_extension("light-map"), &endings)?;
+        let stem = standard::stem(&self.scene).with_added_extension("light-map");
+        self.output.name(stem, &endings)?;
         let start = Instant::now();
         self.reading.texture_coordinates = true;
         let Input { scene, .. } = self.reading.read(&self.scene)?;

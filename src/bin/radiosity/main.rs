@@ -22,12 +22,9 @@
 // The same bytes on every platform: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-/// Prints a line, also where nobody reads on, as behind `| head`: `println!` panics there.
+/// Prints a line: [`standard::say`].
 macro_rules! say {
-    ($($line:tt)*) => {{
-        use std::io::Write as _;
-        _ = writeln!(std::io::stdout(), $($line)*);
-    }};
+    ($($line:tt)*) => { $crate::standard::say(format_args!($($line)*)) };
 }
 
 mod args;
@@ -47,6 +44,7 @@ mod progress;
 mod report;
 mod scene_options;
 mod sky;
+mod standard;
 mod sun;
 mod trade_off;
 mod ugr;

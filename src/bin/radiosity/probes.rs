@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::args::{self, Output, Parsed, Stop, numbers, value};
 use crate::light::{Light, LightOptions};
-use crate::progress;
+use crate::{progress, standard};
 
 /// Gathers irradiance at a grid of probes in the air, as spherical harmonics for games
 #[derive(Args)]
@@ -53,7 +53,7 @@ fn bounds(text: &str) -> Parsed<Aabb> {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        self.output.name(self.scene.with_extension(""), &["csv", "json"])?;
+        self.output.name(standard::stem(&self.scene), &["csv", "json"])?;
         let scene = self.light.scene(&self.scene)?;
         let grid = self.grid(&scene)?;
         let light = self.light.bake(scene)?;

@@ -9,8 +9,8 @@ use radiosity::{Error, Rgb, Scene, SceneSettings};
 
 use crate::args::{Names, Parsed, give, one_of, rgb, value};
 use crate::luminaires::{LuminaireOptions, Luminaires};
-use crate::progress;
 use crate::sky::SkyOptions;
+use crate::{progress, standard};
 
 const SIDES: Names<Sides> =
     &[("auto", Sides::Auto), ("front", Sides::Front), ("both", Sides::Both)];
@@ -130,7 +130,7 @@ impl SceneOptions {
             if !luminaires.is_empty() {
                 settings.sky.get_or_insert_default();
             }
-            let scene = settings.load(path)?;
+            let scene = settings.load(standard::input(path)?)?;
             let up = match self.sky.up() {
                 Some(axis) => UpAxis::given(axis),
                 None => UpAxis::of(&scene, &luminaires.aims()),

@@ -22,7 +22,7 @@ use runs::{Run, Target};
 
 use crate::args::{self, DeviceOptions, MeasureOptions, Output, Stop, value};
 use crate::scene_options::{Input, SceneOptions};
-use crate::{interrupt, progress};
+use crate::{interrupt, progress, standard};
 
 /// Measures time and error of bakes of a scene, over their settings
 #[derive(Args)]
@@ -91,7 +91,7 @@ struct Bench {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        let mut stem = self.scene.with_extension("").into_os_string();
+        let mut stem = standard::stem(&self.scene).into_os_string();
         stem.push("_trade_off");
         self.output.name(stem.into(), &["csv", "png"])?;
         let Input { scene, .. } = self.reading.read(&self.scene)?;

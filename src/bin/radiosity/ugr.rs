@@ -8,7 +8,7 @@ use radiosity::glare::{Glare, GlareSource, Observer};
 
 use crate::args::{self, Output, Parsed, Stop, numbers};
 use crate::scene_options::{Input, SceneOptions};
-use crate::{interrupt, progress};
+use crate::{interrupt, progress, standard};
 
 /// Computes the unified glare rating (UGR, CIE 117) of observers
 #[derive(Args)]
@@ -41,7 +41,7 @@ fn observer(text: &str) -> Parsed<[DVec3; 2]> {
 impl Options {
     /// Runs the command.
     pub fn run(mut self) -> Result<(), Stop> {
-        self.output.name(self.scene.with_extension(""), &["csv"])?;
+        self.output.name(standard::stem(&self.scene), &["csv"])?;
         self.reading.needs_up = true;
         self.reading.sky.be_photometric();
         let Input { scene, .. } = self.reading.read(&self.scene)?;

@@ -19,7 +19,7 @@ use radiosity::{Error, ErrorKind, Scene, SceneSettings, ViewFactors};
 pub use report::print_checks;
 
 use crate::args::{self, Stop, value};
-use crate::progress;
+use crate::{progress, standard};
 
 /// Groups whose factors are printed at most.
 pub const MAX_PRINTED: usize = 16;
@@ -149,7 +149,7 @@ impl Options {
     fn run_scene(&self, path: &Path) -> Result<(), Stop> {
         let stem = match (&self.out, path.file_stem()) {
             (Some(folder), Some(name)) => folder.join(name),
-            _ => path.with_extension(""),
+            _ => standard::stem(path),
         };
         for format in self.matrix.formats.iter().flatten() {
             args::check_writable(&format.path(&stem))?;

@@ -19,6 +19,7 @@ use crate::bake::bands;
 use crate::camera_option::CameraOption;
 use crate::progress;
 use crate::scene_options::SceneOptions;
+use crate::standard;
 use crate::viewer_options::{ViewerOptions, glb_settings, is_lit};
 
 /// Rays along a pixel's side.
@@ -115,10 +116,16 @@ impl Files {
         (self.metres, self.keeps_mesh) = (reading.unit, keeps_mesh);
         let of_scene =
             |ending| Source { path: scene.into(), ending, scene: reading.scene_name.clone() };
-        self.source = gltf_ending(scene)?.map(of_scene);
+        self.source = gltf_ending(standard::input(scene)?)?.map(of_scene);
         // Not over the scene itself.
         let ending = if self.source.is_some() { "baked" } else { "" };
-        self.output.name(scene.with_extension(ending), &args::names(FORMATS))?;
+        let stem = standard::stem(scene).with_added_extension(ending);
+        if self.output.is_dash() {
+            standard::keep_for_file();
+            (self.formats, self.elements) = (vec![Format::Ply], false);
+        } else {
+            self.output.name(stem, &args::names(FORMATS))?;
+        }
         if ["glb", "gltf"].iter().any(|ending| self.output.path(ending) == scene) {
             let place = scene.display().to_string();
             let remedy = "give the results another name with --out";
@@ -175,8 +182,12 @@ impl Files {
         if self.writes(Format::Ply) {
             let mut surface = self.surface(baked);
             surface.comments = comments(baked);
-            let write = |path: &Path| write_ply_with_tone(path, &surface, tone);
-            progress::of_writing(&self.output.path("ply"), write);
+            if self.output.is_dash() {
+                standard::write(|out| write_ply_with_tone(out, &surface, tone));
+            } else {
+                let write = |path: &Path| write_ply_with_tone(path, &surface, tone);
+                progress::of_writing(&self.output.path("ply"), write);
+            }
         }
         if self.writes(Format::Glb) {
             self.write_glb(baked, &glb_settings(tone, self.metres, baked));
@@ -212,8 +223,10 @@ impl Files {
             return;
         };
         let Source { path, ending, scene } = source;
-        let write =
-            |to: &Path| write_lit_gltf(to, path, &baked.light, scene.as_deref(), settings.clone());
+        let write = |to: &Path| {
+            let source = standard::input(path)?;
+            write_lit_gltf(to, source, &baked.light, scene.as_deref(), settings.clone())
+        };
         let Some(counts) = progress::of_writing(&self.output.path(ending), write) else { return };
         let LitVertices { without, instances, .. } = counts;
         if without > 0 {

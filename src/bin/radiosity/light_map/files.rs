@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 use super::{Options, PICTURE, Shown};
 use crate::args::Names;
 use crate::bake::files::{IMAGE, SAMPLES};
-use crate::progress;
 use crate::viewer_options::glb_settings;
+use crate::{progress, standard};
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,7 +178,7 @@ impl Options {
     /// The ending of the file of a glTF scene, and how it names the map; none where there is no
     /// such file.
     pub fn binding(&self) -> Result<Option<(&'static str, MapBinding)>, Error> {
-        match (gltf_ending(&self.scene)?, self.bind) {
+        match (gltf_ending(standard::input(&self.scene)?)?, self.bind) {
             (Some(ending), bind) => {
                 let Bind(binding) = bind.unwrap_or(Bind(Some(MapBinding::default())));
                 Ok(binding.map(|binding| (ending, binding)))
@@ -212,7 +212,14 @@ impl Options {
         let files: Vec<String> = page_names(&map.atlas).iter().map(file).collect();
         let scene = self.reading.scene_name.as_deref();
         let write = |path: &Path| {
-            write_mapped_gltf(path, &self.scene, map, scene, (binding, &files), settings.clone())
+            write_mapped_gltf(
+                path,
+                standard::input(&self.scene)?,
+                map,
+                scene,
+                (binding, &files),
+                settings.clone(),
+            )
         };
         let instances = progress::of_writing(to, write).unwrap_or(0);
         if instances > 0 {
