@@ -25,5 +25,5 @@ mod team;
 pub(crate) use batches::{Batches, map};
 pub use journal::{Journal, JournalPart};
 pub use ranks::{Alone, Ranks};
-pub(crate) use team::now;
 pub use team::{agree, alone, from_first, is_first, with_journal, with_ranks};
+pub(crate) use team::{is_shared, now};

@@ -8,10 +8,12 @@
 //! through [`Ranks`]: parts of them are taken from a counter, which a thread of the first process
 //! serves, and results are exchanged.
 
+use std::cell::RefCell;
 use std::io::Write;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -54,8 +56,13 @@ pub fn run(program: impl FnOnce() -> ExitCode) -> ExitCode {
         SimpleCommunicator::world().abort(101);
     }));
     let mut errors = (world.rank() > 0).then(silence).flatten();
-    let code = with_ranks(Box::new(World::new(world.duplicate())), program);
+    let counter = Rc::new(RefCell::new(Counter::new(&world)));
+    let ranks = World { all: world.duplicate(), counter: counter.clone() };
+    let code = with_ranks(Box::new(ranks), program);
     end_together(&world, code, errors.as_mut());
+    // The first process answers until all have what they asked for.
+    counter.borrow_mut().end();
+    world.barrier();
     code
 }
 
@@ -93,19 +100,12 @@ fn end_together(world: &SimpleCommunicator, code: ExitCode, errors: Option<&mut 
 /// All processes of the run.
 struct World {
     all: SimpleCommunicator,
-    counter: Option<Counter>,
+    counter: Rc<RefCell<Counter>>,
 }
 
 impl std::fmt::Debug for World {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "process {} of {}", self.rank(), self.size())
-    }
-}
-
-impl World {
-    fn new(all: SimpleCommunicator) -> World {
-        let counter = (all.rank() == 0 && all.size() > 1).then(Counter::start);
-        World { all, counter }
     }
 }
 
@@ -143,40 +143,82 @@ impl Ranks for World {
         gathered
     }
 
-    fn take(&mut self) -> u64 {
-        match &self.counter {
-            Some(counter) => counter.next.fetch_add(1, Ordering::Relaxed),
-            None => {
+    fn take(&mut self, round: u64) -> u64 {
+        match &mut *self.counter.borrow_mut() {
+            Counter::Own { counter, .. } => counter.lock().take(round),
+            Counter::Remote { asked } => {
                 let world = SimpleCommunicator::world();
                 let first = world.process_at_rank(0);
-                first.send_with_tag(&0u64, ASK);
-                first.receive_with_tag::<u64>(NUMBER).0
+                if *asked != Some(round) {
+                    // An answer that was asked for in a round that has ended.
+                    if asked.is_some() {
+                        first.receive_with_tag::<u64>(NUMBER);
+                    }
+                    first.send_with_tag(&round, ASK);
+                }
+                let (number, _) = first.receive_with_tag::<u64>(NUMBER);
+                // The next one comes while this part is worked at.
+                first.send_with_tag(&round, ASK);
+                *asked = Some(round);
+                number
             }
         }
     }
 }
 
-/// The counter, in the first process; a thread answers those that ask.
+/// The counter of rounds.
 ///
-/// MPI's own shared memory does without the thread, but its bindings for Rust do not have it.
-struct Counter {
-    next: Arc<AtomicU64>,
-    ends: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+/// MPI's own shared memory does without a thread that answers, but its bindings for Rust do not
+/// have it.
+enum Counter {
+    /// In the first process, where a thread answers those that ask.
+    Own { counter: Arc<SharedRounds>, ends: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
+    /// In others: the round for which a number was asked and has not been received.
+    Remote { asked: Option<u64> },
+}
+
+/// A round, and the numbers of it that were taken.
+#[derive(Default)]
+struct Rounds {
+    round: u64,
+    taken: u64,
+}
+
+#[derive(Default)]
+struct SharedRounds(Mutex<Rounds>);
+
+impl SharedRounds {
+    fn lock(&self) -> MutexGuard<'_, Rounds> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Rounds {
+    /// The next number of `round`; of one that has ended, any.
+    fn take(&mut self, round: u64) -> u64 {
+        if round > self.round {
+            *self = Rounds { round, taken: 0 };
+        }
+        self.taken += u64::from(round == self.round);
+        self.taken.wrapping_sub(1)
+    }
 }
 
 impl Counter {
-    fn start() -> Counter {
-        let (next, ends) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+    fn new(world: &SimpleCommunicator) -> Counter {
+        if world.rank() > 0 {
+            return Counter::Remote { asked: None };
+        }
+        let (counter, ends) = (Arc::new(SharedRounds::default()), Arc::new(AtomicBool::new(false)));
         let thread = std::thread::spawn({
-            let (next, ends) = (next.clone(), ends.clone());
+            let (counter, ends) = (counter.clone(), ends.clone());
             move || {
                 let world = SimpleCommunicator::world();
                 while !ends.load(Ordering::Relaxed) {
                     match world.any_process().immediate_matched_probe_with_tag(ASK) {
                         Some((message, asked)) => {
-                            _ = message.matched_receive::<u64>();
-                            let number = next.fetch_add(1, Ordering::Relaxed);
+                            let (round, _) = message.matched_receive::<u64>();
+                            let number = counter.lock().take(round);
                             let asker = world.process_at_rank(asked.source_rank());
                             asker.send_with_tag(&number, NUMBER);
                         }
@@ -185,15 +227,27 @@ impl Counter {
                 }
             }
         });
-        Counter { next, ends, thread: Some(thread) }
+        Counter::Own { counter, ends, thread: Some(thread) }
+    }
+}
+
+impl Counter {
+    /// Receives what was asked for.
+    fn end(&mut self) {
+        if let Counter::Remote { asked: asked @ Some(_) } = self {
+            SimpleCommunicator::world().process_at_rank(0).receive_with_tag::<u64>(NUMBER);
+            *asked = None;
+        }
     }
 }
 
 impl Drop for Counter {
     fn drop(&mut self) {
-        self.ends.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            _ = thread.join();
+        if let Counter::Own { ends, thread, .. } = self {
+            ends.store(true, Ordering::Relaxed);
+            if let Some(thread) = thread.take() {
+                _ = thread.join();
+            }
         }
     }
 }

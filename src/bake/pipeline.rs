@@ -90,7 +90,7 @@ impl<'p> Pipeline<'p> {
         progress: ProgressCallback<'p>,
     ) -> Result<Pipeline<'p>, Error> {
         settings.check()?;
-        let reporter = Reporter { backend, callback: progress };
+        let reporter = Reporter::new(backend, progress);
         Ok(Pipeline { settings, backend, target, reporter, clock: StageClock::start() })
     }
 

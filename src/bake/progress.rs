@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::gather::{GatheredMesh, Progress as GatherProgress};
 use crate::progress::{Instant, Timings, lap};
 use crate::solver::Progress;
-use crate::work::agree;
+use crate::work::{agree, is_shared};
 
 /// The stage that a bake is at.
 ///
@@ -52,18 +52,35 @@ pub(super) type ProgressCallback<'a> = &'a mut dyn FnMut(&BakeProgress) -> Contr
 pub(super) struct Reporter<'a> {
     pub backend: &'a ResilientBackend<'a>,
     pub callback: ProgressCallback<'a>,
+    /// Reports that processes have not agreed upon, and whether one of them was to stop the bake.
+    pending: u32,
+    stops: bool,
 }
 
-impl Reporter<'_> {
+/// Reports of shooting that processes agree upon together: a row is made within microseconds.
+const REPORTS_OF_SHOOTING: u32 = 64;
+
+impl<'a> Reporter<'a> {
+    pub fn new(backend: &'a ResilientBackend<'a>, callback: ProgressCallback<'a>) -> Reporter<'a> {
+        Reporter { backend, callback, pending: 0, stops: false }
+    }
+
     /// Reports `stage`, and before that a failure of the device that was not reported yet.
     pub fn report(&mut self, stage: BakeProgress) -> ControlFlow<()> {
+        // Devices of other processes go on.
         let failure = self.backend.new_failure().map(BakeProgress::DeviceFailed);
         let failed = failure.map_or(ControlFlow::Continue(()), |failed| (self.callback)(&failed));
-        // Devices of other processes go on.
-        agree(match failed {
-            ControlFlow::Continue(()) => (self.callback)(&stage),
-            stop => stop,
-        })
+        self.stops |= failed.is_break() || (self.callback)(&stage).is_break();
+        self.pending += 1;
+        let few = matches!(stage, BakeProgress::Shooting(_)) && self.pending < REPORTS_OF_SHOOTING;
+        let flow = if self.stops { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        match few && is_shared() {
+            true => ControlFlow::Continue(()),
+            false => {
+                (self.pending, self.stops) = (0, false);
+                agree(flow)
+            }
+        }
     }
 }
 

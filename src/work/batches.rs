@@ -11,8 +11,9 @@ use super::team;
 use crate::progress::Instant;
 
 /// Batches grow or shrink towards this duration, so that progress is reported several times a
-/// second.
+/// second; where they are shared with other processes once, since each ends with an exchange.
 const BATCH_DURATION: Duration = Duration::from_millis(250);
+const SHARED_BATCH_DURATION: Duration = Duration::from_secs(1);
 
 /// Items of a part of [`map`], at least: a fraction of a millisecond. Plain choice.
 const ITEMS_OF_PART: usize = 512;
@@ -86,7 +87,11 @@ impl Batches {
                         let least = self.least.div_ceil(processes);
                         let (results, duration) =
                             team.share_out(count, least, &mut |part| work(&remaining[part]))?;
-                        self.adapt(duration, count == self.size.saturating_mul(processes));
+                        let wanted = match processes {
+                            1 => BATCH_DURATION,
+                            _ => SHARED_BATCH_DURATION,
+                        };
+                        self.adapt(duration, wanted, count == self.size.saturating_mul(processes));
                         team.to_journal(number, self.done, &results);
                         (count, results)
                     }
@@ -96,7 +101,7 @@ impl Batches {
                 let count = remaining.len().min(self.size);
                 let start = Instant::now();
                 let results = work(&remaining[..count])?;
-                self.adapt(start.elapsed(), count == self.size);
+                self.adapt(start.elapsed(), BATCH_DURATION, count == self.size);
                 (count, results)
             }
         };
@@ -108,11 +113,11 @@ impl Batches {
     }
 
     /// After a batch that took too long the next is half as large; after a full one that took less
-    /// than a third of [`BATCH_DURATION`], twice as large.
-    fn adapt(&mut self, duration: Duration, is_full: bool) {
-        if duration > BATCH_DURATION {
+    /// than a third of what is `wanted`, twice as large.
+    fn adapt(&mut self, duration: Duration, wanted: Duration, is_full: bool) {
+        if duration > wanted {
             self.size = (self.size / 2).max(self.least);
-        } else if duration < BATCH_DURATION / 3 && is_full {
+        } else if duration < wanted / 3 && is_full {
             self.size *= 2;
         }
     }

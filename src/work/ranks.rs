@@ -4,7 +4,8 @@ use std::fmt;
 
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
-/// Every process makes the same calls in the same order, but for [`Ranks::take`].
+/// Every process makes the same calls in the same order, but for the number of calls of
+/// [`Ranks::take`] in a round.
 pub trait Ranks: fmt::Debug {
     /// Index of this process, from 0.
     fn rank(&self) -> usize;
@@ -15,13 +16,15 @@ pub trait Ranks: fmt::Debug {
     /// Sends `bytes` to all processes; returns the bytes of all of them, by rank.
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;
 
-    /// The next number of a counter that all processes share: 0 at first, each number once.
-    fn take(&mut self) -> u64;
+    /// The next number of the counter of this `round`, which all processes share: from 0, each
+    /// number once. Rounds ascend, and each ends with a call of [`Ranks::all_gather`].
+    fn take(&mut self, round: u64) -> u64;
 }
 
 /// A single process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Alone {
+    round: u64,
     taken: u64,
 }
 
@@ -38,8 +41,9 @@ impl Ranks for Alone {
         vec![bytes.to_vec()]
     }
 
-    fn take(&mut self) -> u64 {
-        self.taken += 1;
-        self.taken - 1
+    fn take(&mut self, round: u64) -> u64 {
+        self.taken = if round == self.round { self.taken + 1 } else { 0 };
+        self.round = round;
+        self.taken
     }
 }

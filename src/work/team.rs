@@ -23,8 +23,8 @@ pub(super) struct Team {
     replays: bool,
     /// Loops that began so far.
     loops: u64,
-    /// Numbers that were taken before this batch.
-    taken: u64,
+    /// Batches that were shared out so far.
+    rounds: u64,
     /// When this process began to work with others.
     start: Instant,
     /// The clock of process 0 at the last exchange, since its start.
@@ -91,6 +91,11 @@ where
 pub fn alone<T>(work: impl FnOnce() -> T) -> T {
     let _kept = borrow();
     work()
+}
+
+/// Whether other processes take part.
+pub(crate) fn is_shared() -> bool {
+    borrow().is_some_and(|team| team.processes() > 1)
 }
 
 /// Whether this process is the first, which prints and writes.
@@ -160,7 +165,7 @@ impl Team {
             journal: None,
             replays: false,
             loops: 0,
-            taken: 0,
+            rounds: 0,
             start: Instant::now(),
             agreed: Duration::ZERO,
         }
@@ -237,21 +242,15 @@ impl Team {
         }
         let parts = parts(count, processes, least);
         let mut own: Result<Vec<(u32, Vec<R>)>, E> = Ok(vec![]);
-        // Each process takes one number past the last.
-        let first = self.taken;
-        self.taken += (parts.len() + processes) as u64;
-        loop {
-            let k = (self.ranks.take() - first) as usize;
-            let (Some(part), Ok(done)) = (parts.get(k), &mut own) else {
-                if k < parts.len() {
-                    continue;
-                }
-                break;
-            };
+        self.rounds += 1;
+        // The first part of each process needs no counter.
+        let mut k = self.ranks.rank();
+        while let (Some(part), Ok(done)) = (parts.get(k), &mut own) {
             match work(part.clone()) {
                 Ok(results) => done.push((k as u32, results)),
                 Err(error) => own = Err(error),
             }
+            k = processes + self.ranks.take(self.rounds) as usize;
         }
         let (busy, of_all) = self.exchange(start.elapsed(), &own);
         let mut by_part: Vec<(u32, Vec<R>)> = vec![];
@@ -280,12 +279,17 @@ impl Team {
     }
 }
 
+/// Parts of an even share of a batch that the last ones are, at least: so far apart are the ends of
+/// processes, where items are alike, and a process is not held up by asking for parts.
+const LAST_PARTS: usize = 64;
+
 /// The parts of `count` items for `processes` that take them on demand: half of an even share of
-/// what is left, `least` at the end.
+/// what is left, and `least` at least.
 ///
 /// Source: Polychronopoulos, Kuck 1987, guided self-scheduling; with half of its parts, since items
 /// differ.
 fn parts(count: usize, processes: usize, least: usize) -> Vec<Range<usize>> {
+    let least = least.max(count / (processes * LAST_PARTS));
     let mut parts = vec![];
     let mut start = 0;
     while start < count {

@@ -11,8 +11,8 @@ struct Thread {
     rank: usize,
     given: Arc<Mutex<Vec<Vec<u8>>>>,
     barrier: Arc<Barrier>,
-    /// The counter that all share, and how many numbers each has taken.
-    counter: Arc<AtomicU64>,
+    /// The round and the counter that all share, and how many numbers each has taken.
+    counter: Arc<Mutex<(u64, u64)>>,
     taken: Arc<Vec<AtomicU64>>,
 }
 
@@ -33,9 +33,14 @@ impl Ranks for Thread {
         all
     }
 
-    fn take(&mut self) -> u64 {
+    fn take(&mut self, round: u64) -> u64 {
         self.taken[self.rank].fetch_add(1, Ordering::Relaxed);
-        self.counter.fetch_add(1, Ordering::Relaxed)
+        let mut counter = self.counter.lock().unwrap();
+        if counter.0 != round {
+            *counter = (round, 0);
+        }
+        counter.1 += 1;
+        counter.1 - 1
     }
 }
 

@@ -43,10 +43,12 @@ function byProgram({ adapter, driver }, error) {
   const folder = fs.mkdtempSync(path.join(os.tmpdir(), "radiosity-gpu-"));
   const ply = path.join(folder, "box.ply");
   const own = driver ? { VK_ICD_FILENAMES: driver, VK_DRIVER_FILES: driver } : {};
-  const cargo = ["run", "--locked", "--release", "--quiet", "--features", "cli", "--bin", "radiosity", "--"];
+  // One that is built already, or the one of this source.
+  const built = ["run", "--locked", "--release", "--quiet", "--features", "cli", "--bin", "radiosity", "--"];
+  const [program, first] = process.env.RADIOSITY ? [process.env.RADIOSITY, []] : ["cargo", built];
   const bake = ["bake", path.join(ROOT, "scenes/cornell_box.obj"), "--error", String(error), "-o", ply];
   const device = ["--adapter", adapter, "--adapter-kind", "discrete"];
-  execFileSync("cargo", [...cargo, ...bake, ...device], {
+  execFileSync(program, [...first, ...bake, ...device], {
     cwd: ROOT,
     env: { XDG_RUNTIME_DIR: os.tmpdir(), ...process.env, ...own },
     stdio: "ignore",
