@@ -5,7 +5,7 @@
 //! ```
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -45,15 +45,39 @@ fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
         }
         path.with_file_name(name)
     };
-    // Others may be writing the same one, or have been killed while they were.
+    // Another program may be writing the same one: it holds a lock. What one that was killed has
+    // left is used again.
     let mut number = 0;
     loop {
         let new = of_number(number);
-        match File::options().write(true).create_new(true).open(&new) {
-            Err(e) if e.kind() == ErrorKind::AlreadyExists && number < 1000 => number += 1,
-            file => return Ok((new, file?)),
+        let file = File::options().write(true).create(true).truncate(false).open(&new)?;
+        let is_locked = match file.try_lock() {
+            Ok(()) => false,
+            Err(TryLockError::WouldBlock) => true,
+            // A file system without locks: what is there may be written just now.
+            Err(TryLockError::Error(_)) => file.metadata()?.len() > 0,
+        };
+        if is_locked && number < 1000 {
+            number += 1;
+        } else if is_locked {
+            return Err(io::Error::new(ErrorKind::ResourceBusy, "1000 programs write it"));
+        } else if is_at(&file, &new)? {
+            file.set_len(0)?;
+            return Ok((new, file));
         }
     }
+}
+
+/// Whether `file` is at `path` still: until it was locked, another program may have renamed it.
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    let (Ok(at), own) = (fs::metadata(path), file.metadata()?) else { return Ok(false) };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        Ok((at.dev(), at.ino()) == (own.dev(), own.ino()))
+    }
+    #[cfg(not(unix))]
+    Ok(at.len() == own.len())
 }
 
 /// Writes a new file, and waits until the disk has it.
@@ -95,11 +119,18 @@ mod tests {
         assert_eq!(replace(&path, full).unwrap_err().kind(), ErrorKind::StorageFull);
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.ply"]);
-        // Beside what a killed program left.
-        fs::write(folder.path().join(".a.ply.new"), "half").unwrap();
+        // What a killed program left is used again; what another one writes is not.
+        let left = folder.path().join(".a.ply.new");
+        fs::write(&left, "half of another file").unwrap();
         replace(&path, |out| out.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
-        assert_eq!(names(folder.path()), [".a.ply.new", "a.ply"]);
+        assert_eq!(names(folder.path()), ["a.ply"]);
+        fs::write(&left, "half").unwrap();
+        let other = File::options().write(true).open(&left).unwrap();
+        other.lock().unwrap();
+        replace(&path, |out| out.write_all(b"newer")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"newer");
+        assert_eq!(fs::read(&left).unwrap(), b"half");
     }
 
     #[test]

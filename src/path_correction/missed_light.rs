@@ -241,7 +241,7 @@ impl<const M: usize> Paths<'_, M> {
         let along = AreaSampler::new(self.order.iter().map(weight));
         let (first, round) = (self.count, radical_inverse(self.count as u32 + 1));
         let numbers: Vec<usize> = (first..first + more).collect();
-        let (mut remaining, mut batches) = (&numbers[..], Batches::new(1024));
+        let (mut remaining, mut batches) = (&numbers[..], Batches::new(1024).without_journal());
         while !remaining.is_empty() {
             let trace = |&path: &usize| {
                 let share = ((path - first) as f64 + round) / more as f64;

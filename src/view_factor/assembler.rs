@@ -12,6 +12,8 @@
 //! Later fronts only: A_i F_ij = A_j F_ji gives the other half. The tolerance of a group's error is
 //! shared between the polygons of the giving group by area, in squares.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::blocker_tree::BlockerTree;
@@ -23,7 +25,6 @@ use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::scene_polygons::ScenePolygons;
 use crate::sampling::hash::split_mix64;
-use crate::work::Batches;
 
 /// Computes the rows of the polygons `wanted`; `None` if stopped.
 pub(super) fn make(
@@ -33,17 +34,30 @@ pub(super) fn make(
     making: &mut Making,
 ) -> Option<()> {
     let assembler = Assembler::new(polygons, error);
-    let (count, mut remaining) = (wanted.len(), wanted);
-    // A polygon is done by one thread.
-    let mut batches = Batches::new(4).at_least(2 * rayon::current_num_threads());
-    while !remaining.is_empty() {
-        let of_polygon = |&s: &u32| assembler.row(s as usize);
-        let (batch, rows) =
-            batches.next(&mut remaining, |batch| batch.par_iter().map(of_polygon).collect());
-        batch.iter().zip(rows).for_each(|(&s, row)| making.add(s, row));
-        making.report(count - remaining.len(), count)?;
-    }
-    Some(())
+    let pieces_of = |&s: &u32| assembler.receivers(s).map(move |piece| (s, piece));
+    let pieces: Vec<(u32, Receivers)> = wanted.iter().flat_map(pieces_of).collect();
+    making.rows_of_pieces(
+        wanted,
+        &pieces,
+        |done| (done, wanted.len()),
+        |s, receivers| assembler.exchanges(s as usize, receivers),
+        |_, mut pieces| {
+            let back = pieces.pop().and_then(|backs| backs.first().copied()).unwrap_or_default();
+            PolygonRow { fronts: pieces.concat(), back }
+        },
+    )
+}
+
+/// Fronts that a piece of a row has, at least: few, since of a row of many pairs that are occluded
+/// by much each takes milliseconds. Plain choice.
+const FRONTS_OF_PIECE: usize = 16;
+
+/// What a polygon exchanges with in one piece of its row.
+enum Receivers {
+    /// Fronts of whole groups, but for the polygon's own, by their indices.
+    Fronts(Range<usize>),
+    /// All backs: the last piece.
+    Backs,
 }
 
 /// The error bound of a factor, as a share of the requested error. Its estimate is reduced to a
@@ -71,28 +85,45 @@ impl Assembler {
         Assembler { fronts: fronts.polygons, backs, blockers, areas: fronts.areas, error }
     }
 
-    /// The exchange of polygon `s` with later ones and with backs.
-    fn row(&self, s: usize) -> PolygonRow {
+    /// The pieces of the row of polygon `s`: later ones, and backs.
+    fn receivers(&self, s: u32) -> impl Iterator<Item = Receivers> {
+        let (mut start, count) = (s as usize + 1, self.fronts.len());
+        let fronts = std::iter::from_fn(move || {
+            let least = start + FRONTS_OF_PIECE;
+            let is_inside = |k: &usize| self.fronts[k - 1].group == self.fronts[*k].group;
+            let end = (least..count).find(|k| !is_inside(k)).unwrap_or(count);
+            let piece = (start < count).then_some(Receivers::Fronts(start..end));
+            start = end;
+            piece
+        });
+        fronts.chain([Receivers::Backs])
+    }
+
+    /// The exchange of polygon `s` with each group of these `receivers`, or with all backs.
+    fn exchanges(&self, s: usize, receivers: &Receivers) -> Vec<Exchange> {
         let mut visibility = PointVisibility::default();
         let from = &self.fronts[s];
-        let mut fronts: Vec<Exchange> = Vec::new();
         let group_area = self.areas[from.group as usize];
         // Errors of the polygons of a group are independent: squares add up.
         let share = self.bound_share(from);
-        let mut t = s + 1;
-        for group in self.fronts[s + 1..].chunk_by(|a, b| a.group == b.group) {
+        let Receivers::Fronts(range) = receivers else {
+            let receivers = self.backs.iter().zip(self.fronts.len()..);
+            let back = self.flux(s, receivers, share * group_area, &mut visibility);
+            return vec![Exchange::new(0, back)];
+        };
+        let mut exchanges = vec![];
+        let mut t = range.start;
+        for group in self.fronts[range.clone()].chunk_by(|a, b| a.group == b.group) {
             let to = group[0].group;
             let receivers = group.iter().zip(t..);
             t += group.len();
             let tolerance = share * group_area.min(self.areas[to as usize]);
             let flux = self.flux(s, receivers, tolerance, &mut visibility);
             if flux.value > 0.0 || flux.error > 0.0 {
-                fronts.push(Exchange::new(to, flux));
+                exchanges.push(Exchange::new(to, flux));
             }
         }
-        let receivers = self.backs.iter().zip(self.fronts.len()..);
-        let back = self.flux(s, receivers, share * group_area, &mut visibility);
-        PolygonRow { fronts, back: Exchange::new(0, back) }
+        exchanges
     }
 
     /// The error bound of a sum from a polygon, as a share of the area of the smaller group.

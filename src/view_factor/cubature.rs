@@ -24,6 +24,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::matrix::Estimate;
 use super::point_visibility::{PointFactors, PointVisibility};
@@ -272,6 +273,11 @@ impl SquaredErrors {
 /// Maximum number of cells of a sum: limits time and memory; the remaining error is reported.
 pub(super) const MAX_CELLS: usize = 40_000;
 
+/// Cells of which one is cut at once: so many more than needed are cut in the end, and so many
+/// threads share the work on a sum of many cells, by which a ground under a city takes longer than
+/// all other polygons.
+const CELLS_PER_CUT: usize = 64;
+
 /// The sum of A₁F₁₂ over all `pairs`: cells are cut until the error bound of the sum is at most
 /// `tolerance` and its estimate a tenth of that, or `max_cells` are reached.
 pub(super) fn integrate_adaptively(
@@ -289,18 +295,37 @@ pub(super) fn integrate_adaptively(
         }
     }
     while !squared_errors.are_within(tolerance) && heap.len() < max_cells {
-        let Some((1.., Reverse((pair, cell)))) = heap.pop() else { break };
-        let occluded = &mut pairs[pair];
-        squared_errors.remove(&occluded.cells[cell]);
-        let parts = occluded.cells[cell].split(occluded, visibility);
-        for (k, part) in parts.into_iter().enumerate() {
-            squared_errors.add(&part);
-            let index = if k == 0 { cell } else { occluded.cells.len() };
-            heap.push(part.in_heap(pair, index));
-            if k == 0 {
-                occluded.cells[cell] = part;
-            } else {
-                occluded.cells.push(part);
+        // Of few cells the worst one; of many as many as threads have work with.
+        let count = heap.len().div_ceil(CELLS_PER_CUT);
+        let worst: Vec<(usize, usize)> = std::iter::from_fn(|| match heap.pop() {
+            Some((1.., Reverse(place))) => Some(place),
+            _ => None,
+        })
+        .take(count)
+        .collect();
+        let split = |&(pair, cell): &(usize, usize), visibility: &mut PointVisibility| {
+            pairs[pair].cells[cell].split(&pairs[pair], visibility)
+        };
+        let cut: Vec<Vec<Cell>> = match &worst[..] {
+            [] => break,
+            [only] => vec![split(only, visibility)],
+            many => many
+                .par_iter()
+                .map_init(PointVisibility::default, |visibility, place| split(place, visibility))
+                .collect(),
+        };
+        for (&(pair, cell), parts) in worst.iter().zip(cut) {
+            let cells = &mut pairs[pair].cells;
+            squared_errors.remove(&cells[cell]);
+            for (k, part) in parts.into_iter().enumerate() {
+                squared_errors.add(&part);
+                let index = if k == 0 { cell } else { cells.len() };
+                heap.push(part.in_heap(pair, index));
+                if k == 0 {
+                    cells[cell] = part;
+                } else {
+                    cells.push(part);
+                }
             }
         }
     }

@@ -3,8 +3,11 @@
 //! Pairs are computed once, in the row of the earlier polygon. So half of the exchange of a group
 //! is in its own rows and half in those of others: rows become a matrix when all are there.
 
+use std::collections::VecDeque;
 use std::ops::{ControlFlow, Range};
 
+use rayon::prelude::*;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
@@ -13,13 +16,16 @@ use super::matrix_rows::MatrixRows;
 use super::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::Scene;
-use crate::work::agree;
+use crate::work::{Batches, agree};
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radipar\x02";
 
 /// Bytes of the checksum at the end of every file.
 const CHECKSUM_BYTES: usize = 8;
+
+/// Pieces of rows of the first batch, or as many as there are threads. Plain choice.
+const BATCH: usize = 4;
 
 /// Method of computing a matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,8 +97,40 @@ impl Making<'_> {
         agree((self.progress)(&self.part, done, of)).is_continue().then_some(())
     }
 
-    pub fn add(&mut self, polygon: u32, row: PolygonRow) {
-        self.part.rows[polygon as usize] = Some(row);
+    /// Makes the rows of the polygons `wanted`, ascending, from `pieces` of them in that order:
+    /// `work` of each piece, and `row` of all results of a polygon. `progress` turns the number of
+    /// rows done into what is reported. `None` if stopped.
+    pub fn rows_of_pieces<P: Sync, R: Send + Sync + Serialize + DeserializeOwned>(
+        &mut self,
+        wanted: &[u32],
+        pieces: &[(u32, P)],
+        progress: impl Fn(usize) -> (usize, usize),
+        work: impl Fn(u32, &P) -> R + Sync,
+        row: impl Fn(u32, Vec<R>) -> PolygonRow,
+    ) -> Option<()> {
+        let (mut left, mut remaining) = (wanted, pieces);
+        let mut batches = Batches::new(BATCH).at_least(rayon::current_num_threads());
+        let mut made: VecDeque<(u32, R)> = VecDeque::new();
+        while !left.is_empty() {
+            if !remaining.is_empty() {
+                let work = |(s, piece): &(u32, P)| work(*s, piece);
+                let (batch, results) = batches
+                    .next(&mut remaining, |batch| batch.par_iter().map(work).collect::<Vec<R>>());
+                made.extend(batch.iter().map(|(s, _)| *s).zip(results));
+            }
+            // Rows are whole up to that of the next piece.
+            let next = remaining.first().map_or(u32::MAX, |(s, _)| *s);
+            let (whole, rest) = left.split_at(left.partition_point(|&s| s < next));
+            for &s in whole {
+                let own = made.iter().take_while(|(of, _)| *of == s).count();
+                let results = made.drain(..own).map(|(_, result)| result).collect();
+                self.part.rows[s as usize] = Some(row(s, results));
+            }
+            left = rest;
+            let (done, of) = progress(wanted.len() - left.len());
+            self.report(done, of)?;
+        }
+        Some(())
     }
 }
 

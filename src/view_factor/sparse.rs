@@ -27,11 +27,13 @@ use super::scene_polygons::ScenePolygons;
 use crate::scene::Scene;
 use crate::work::Batches;
 
-/// Polygons, or pieces of rows, of the first batch. Plain choice.
+/// Polygons of the first batch. Plain choice.
 const BATCH: usize = 32;
 
-/// Pairs of a row that are estimated by one thread, one after the other. Plain choice.
-const PAIRS_OF_PIECE: usize = 64;
+/// Pairs of known blockers around the polygons of the pairs that are estimated by one thread, one
+/// after the other: what blocks a pair is clipped against one another. Of a city whose ground is one
+/// polygon, pairs with the ground take 200 times as long as others.
+const BLOCKERS_OF_PIECE: usize = 1 << 18;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
 /// many polygons.
@@ -87,39 +89,28 @@ pub(super) fn make(
     let (fronts, rows, known) = (&fronts, &rows, &known);
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
     let later = met_either_way(rows);
-    // The number of pairs of polygons varies by a factor of a thousand.
-    let pieces_of = |&s: &u32| later[s as usize].chunks(PAIRS_OF_PIECE).map(move |c| (s, c));
-    let pieces: Vec<(u32, &[Count])> = wanted.iter().flat_map(pieces_of).collect();
-    let mut batches = Batches::new(BATCH);
-    let (mut remaining, mut rows_to_do) = (&pieces[..], wanted);
-    let mut fronts_of_row = vec![];
-    while !rows_to_do.is_empty() {
-        if !remaining.is_empty() {
-            let of_piece =
-                |&(s, later): &(u32, &[Count])| exchanges_of(&estimator, s, later, error);
-            let (batch, exchanges) = batches
-                .next(&mut remaining, |batch| batch.par_iter().map(of_piece).collect::<Vec<_>>());
-            fronts_of_row.extend(batch.iter().map(|(s, _)| *s).zip(exchanges));
-        }
-        // Rows are whole up to that of the next piece.
-        let next = remaining.first().map_or(u32::MAX, |(s, _)| *s);
-        let (whole, rest) = rows_to_do.split_at(rows_to_do.partition_point(|&s| s < next));
-        let mut exchanges = fronts_of_row.drain(..).peekable();
-        for &s in whole {
-            let mut row =
-                PolygonRow { fronts: vec![], back: to_backs(fronts, &rows[s as usize], s) };
-            while let Some((_, piece)) = exchanges.next_if(|(of, _)| *of == s) {
-                row.fronts.extend(piece);
-            }
-            row.fronts = sums_by_group(row.fronts);
-            making.add(s, row);
-        }
-        fronts_of_row = exchanges.collect();
-        rows_to_do = rest;
-        let done = 2 * count + wanted.len() - rest.len();
-        making.report(done * count / of, count)?;
+    let mut pieces: Vec<(u32, &[Count])> = vec![];
+    for &s in wanted {
+        let blockers = |t: u32| (known[s as usize].len() + known[t as usize].len() + 1).pow(2);
+        let mut of_piece = 0;
+        let is_same_piece = |_: &Count, next: &Count| {
+            of_piece += blockers(next.polygon);
+            let is_same = of_piece < BLOCKERS_OF_PIECE;
+            of_piece *= usize::from(is_same);
+            is_same
+        };
+        pieces.extend(later[s as usize].chunk_by(is_same_piece).map(|piece| (s, piece)));
     }
-    Some(())
+    making.rows_of_pieces(
+        wanted,
+        &pieces,
+        |done| ((2 * count + done) * count / of, count),
+        |s, later| exchanges_of(&estimator, s, later, error),
+        |s, exchanges| PolygonRow {
+            fronts: sums_by_group(exchanges.concat()),
+            back: to_backs(fronts, &rows[s as usize], s),
+        },
+    )
 }
 
 /// The results of `work` for all `items`, in parallel; `None` if stopped. `told` is the range of

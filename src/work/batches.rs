@@ -27,6 +27,8 @@ pub(crate) struct Batches {
     least: usize,
     /// Number among the loops of the program; none in work that is shared as a whole.
     number: Option<u64>,
+    /// Whether results are kept in a journal.
+    is_kept: bool,
     /// Items done so far.
     done: u64,
 }
@@ -38,13 +40,20 @@ enum Never {}
 impl Batches {
     /// The first batch has `first` items.
     pub fn new(first: usize) -> Batches {
-        Batches { size: first.max(1), least: 1, number: team::next_loop(), done: 0 }
+        let number = team::next_loop();
+        Batches { size: first.max(1), least: 1, number, is_kept: true, done: 0 }
     }
 
     /// As many items at least, all but in the last batch: those that are done at once, each by one
     /// thread.
     pub fn at_least(self, least: usize) -> Batches {
         Batches { size: self.size.max(least), least, ..self }
+    }
+
+    /// Results are computed again by a program that resumes: there are so many that a journal would
+    /// be larger than they are worth.
+    pub fn without_journal(self) -> Batches {
+        Batches { is_kept: false, ..self }
     }
 
     /// Takes the next batch off the front of `remaining`; returns it with its results, one for each
@@ -74,7 +83,10 @@ impl Batches {
         let shared = self.number.and_then(|number| Some((number, team::borrow()?)));
         let (count, results) = match shared {
             Some((number, mut team)) => {
-                let kept = team.from_journal(number, self.done, remaining.len());
+                let kept = match self.is_kept {
+                    true => team.from_journal(number, self.done, remaining.len()),
+                    false => None,
+                };
                 match kept {
                     Some(results) => (results.len(), results),
                     None => {
@@ -92,7 +104,9 @@ impl Batches {
                             _ => SHARED_BATCH_DURATION,
                         };
                         self.adapt(duration, wanted, count == self.size.saturating_mul(processes));
-                        team.to_journal(number, self.done, &results);
+                        if self.is_kept {
+                            team.to_journal(number, self.done, &results);
+                        }
                         (count, results)
                     }
                 }
