@@ -9,9 +9,9 @@
 //!                                         exchanged          └► appended to the journal
 //! ```
 //!
-//! All long loops of the crate are [`Batches`]. Who computes an item, and when, changes no result:
+//! All long loops of the crate are `Batches`. Who computes an item, and when, changes no result:
 //! every process runs the same program, and makes the same calls in the same order. What could make
-//! them differ is agreed upon: the ends of batches, the clock ([`now`]), and whether to go on
+//! them differ is agreed upon: the ends of batches, the clock, and whether to go on
 //! ([`agree`]).
 //!
 //! Processes and a journal belong to the thread that runs the program, as the thread pool of rayon

@@ -25,7 +25,8 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("vertex", "error form_factor geometry mesh scene"),
     (
         "gather",
-        "accuracy error form_factor geometry linear mesh progress sampling scene vertex visibility work",
+        "accuracy error form_factor geometry linear mesh progress sampling scene vertex \
+         visibility work",
     ),
     ("path_correction", "accuracy error gather light progress sampling scene visibility work"),
     ("grid", "error gather geometry path_correction scene visibility"),
@@ -42,12 +43,14 @@ const MAY_KNOW: &[(&str, &str)] = &[
     ("verify", "accuracy error geometry light progress sampling scene vertex visibility work"),
     (
         "bake",
-        "accuracy backend error form_factor gather geometry light mesh progress sampling scene solver verify vertex visibility work",
+        "accuracy backend error form_factor gather geometry light mesh progress sampling \
+         scene solver verify vertex visibility work",
     ),
     ("bands", "accuracy backend bake error gather linear mesh scene vertex"),
     (
         "light_map",
-        "accuracy backend bake error gather geometry mesh path_correction progress sampling scene vertex visibility work",
+        "accuracy backend bake error gather geometry mesh path_correction progress sampling \
+         scene vertex visibility work",
     ),
     (
         "kept_mesh",

@@ -31,8 +31,8 @@ use crate::work::Batches;
 const BATCH: usize = 32;
 
 /// Pairs of known blockers around the polygons of the pairs that are estimated by one thread, one
-/// after the other: what blocks a pair is clipped against one another. Of a city whose ground is one
-/// polygon, pairs with the ground take 200 times as long as others.
+/// after the other: what blocks a pair is clipped against one another, so that pairs with the
+/// ground of a city take far longer than others. Plain choice.
 const BLOCKERS_OF_PIECE: usize = 1 << 18;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have

@@ -84,7 +84,7 @@ impl Batches {
         let (count, results) = match shared {
             Some((number, mut team)) => {
                 let kept = match self.is_kept {
-                    true => team.from_journal(number, self.done, remaining.len()),
+                    true => team.recorded(number, self.done, remaining.len()),
                     false => None,
                 };
                 match kept {
@@ -105,7 +105,7 @@ impl Batches {
                         };
                         self.adapt(duration, wanted, count == self.size.saturating_mul(processes));
                         if self.is_kept {
-                            team.to_journal(number, self.done, &results);
+                            team.record(number, self.done, &results);
                         }
                         (count, results)
                     }
@@ -138,7 +138,8 @@ impl Batches {
 }
 
 /// The results of `work` for the numbers below `count`, in their order, by all threads and
-/// processes. They are not kept in a journal. Worth it where an item takes longer than to exchange its result: some tens of nanoseconds.
+/// processes. They are not kept in a journal. Worth it where an item takes longer than to exchange
+/// its result: some tens of nanoseconds.
 pub(crate) fn map<R: Send + Serialize + DeserializeOwned>(
     count: usize,
     work: impl Fn(usize) -> R + Sync,
@@ -172,7 +173,7 @@ mod tests {
         let (mut remaining, mut done) = (&items[..], vec![]);
         let mut batches = Batches::new(3);
         while !remaining.is_empty() {
-            let (batch, results) = batches.next(&mut remaining, |batch| batch.to_vec());
+            let (batch, results) = batches.next(&mut remaining, <[u32]>::to_vec);
             assert_eq!(batch, results);
             done.extend(results);
         }

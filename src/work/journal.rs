@@ -137,8 +137,8 @@ impl Journal {
         read.ok().map(|_| bytes)
     }
 
-    /// Appends the results of loop `number` from item `first` on: by a record a thread, since others
-    /// wait.
+    /// Appends the results of loop `number` from item `first` on: by a record for each thread,
+    /// since all wait.
     pub(super) fn append<R: Serialize + Sync>(&mut self, number: u64, first: u64, results: &[R]) {
         let len = results.len().div_ceil(rayon::current_num_threads()).max(1);
         let of_part = |(k, part): (usize, &[R])| record(&(number, first + (k * len) as u64, part));

@@ -81,7 +81,7 @@ where
         Some(mut team) if team.processes() > 1 => {
             let made = (team.ranks.rank() == 0).then(work);
             let all = team.exchange(Duration::ZERO, &made).1;
-            all.into_iter().flatten().next().expect("the first process has it")
+            all.into_iter().flatten().next().unwrap_or_else(|| unreachable!("the first has it"))
         }
         _ => work(),
     }
@@ -190,7 +190,7 @@ impl Team {
     }
 
     /// The results that the journal has of loop `number` from item `first` on, of `count` at most.
-    pub fn from_journal<R: DeserializeOwned>(
+    pub fn recorded<R: DeserializeOwned>(
         &mut self,
         number: u64,
         first: u64,
@@ -212,7 +212,7 @@ impl Team {
     }
 
     /// Appends the results of loop `number` from item `first` on.
-    pub fn to_journal<R: Serialize + Sync>(&mut self, number: u64, first: u64, results: &[R]) {
+    pub fn record<R: Serialize + Sync>(&mut self, number: u64, first: u64, results: &[R]) {
         if let Some(journal) = &mut self.journal {
             journal.append(number, first, results);
         }

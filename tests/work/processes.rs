@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use radiosity::bake::{BakeProgress, Outcome};
 use radiosity::gather::{GatherPoint, irradiance_at};
 use radiosity::verify::{Settings, verify};
-use radiosity::{Backend, BakeResult, BakeTarget, Scene, load_scene};
+use radiosity::{Backend, BakeResult, BakeTarget, Rgb, Scene, load_scene};
 
 use crate::common::processes::in_processes;
 
@@ -20,7 +20,7 @@ pub fn go(_: &BakeProgress) -> ControlFlow<()> {
 /// All numbers of a bake, by their bits.
 pub fn bits(baked: &BakeResult) -> (Vec<u64>, Vec<u64>) {
     let radiosity = baked.light.surface.radiosity.iter();
-    let radiosity = radiosity.flat_map(|b| b.to_array()).map(f64::to_bits).collect();
+    let radiosity = radiosity.flat_map(Rgb::to_array).map(f64::to_bits).collect();
     (radiosity, baked.light.surface.error.iter().map(|e| e.to_bits()).collect())
 }
 
