@@ -57,7 +57,11 @@ pub fn run(program: impl FnOnce() -> ExitCode) -> ExitCode {
     }));
     let mut errors = (world.rank() > 0).then(silence).flatten();
     let counter = Rc::new(RefCell::new(Counter::new(&world)));
-    let ranks = World { all: world.duplicate(), counter: counter.clone() };
+    let mut ranks = World { all: world.duplicate(), counter: counter.clone() };
+    let places = ranks.places();
+    if world.rank() == 0 {
+        eprintln!("{} processes: {places}", world.size());
+    }
     let code = with_ranks(Box::new(ranks), program);
     end_together(&world, code, errors.as_mut());
     // The first process answers until all have what they asked for.
@@ -106,6 +110,19 @@ struct World {
 impl std::fmt::Debug for World {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "process {} of {}", self.rank(), self.size())
+    }
+}
+
+impl World {
+    /// The hosts, with the number of threads of each process there.
+    fn places(&mut self) -> String {
+        let host = mpi::environment::processor_name().unwrap_or_default();
+        let own = format!("{host}, {} threads", rayon::current_num_threads());
+        let mut of_all: Vec<Vec<u8>> = self.all_gather(own.as_bytes());
+        of_all.sort();
+        let alike = of_all.chunk_by(|a, b| a == b);
+        let alike = alike.map(|run| format!("{} on {}", run.len(), String::from_utf8_lossy(&run[0])));
+        alike.collect::<Vec<_>>().join("; ")
     }
 }
 
