@@ -121,7 +121,8 @@ impl World {
         let mut of_all: Vec<Vec<u8>> = self.all_gather(own.as_bytes());
         of_all.sort();
         let alike = of_all.chunk_by(|a, b| a == b);
-        let alike = alike.map(|run| format!("{} on {}", run.len(), String::from_utf8_lossy(&run[0])));
+        let alike =
+            alike.map(|run| format!("{} on {}", run.len(), String::from_utf8_lossy(&run[0])));
         alike.collect::<Vec<_>>().join("; ")
     }
 }
