@@ -13,7 +13,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,8 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
 use mpi::{Count, Tag, Threading};
 use radiosity::work::{Ranks, with_ranks};
+
+use crate::progress::locked;
 
 /// Bytes that all processes give together at once: MPI counts in 31 bits.
 const MAX_BYTES: usize = 1 << 30;
@@ -163,7 +165,7 @@ impl Ranks for World {
 
     fn take(&mut self, round: u64) -> u64 {
         match &mut *self.counter.borrow_mut() {
-            Counter::Own { counter, .. } => counter.lock().take(round),
+            Counter::Own { counter, .. } => locked(counter).take(round),
             Counter::Remote { asked } => {
                 let world = SimpleCommunicator::world();
                 let first = world.process_at_rank(0);
@@ -190,7 +192,7 @@ impl Ranks for World {
 /// have it.
 enum Counter {
     /// In the first process, where a thread answers those that ask.
-    Own { counter: Arc<SharedRounds>, ends: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
+    Own { counter: Arc<Mutex<Rounds>>, ends: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
     /// In others: the round for which a number was asked and has not been received.
     Remote { asked: Option<u64> },
 }
@@ -200,15 +202,6 @@ enum Counter {
 struct Rounds {
     round: u64,
     taken: u64,
-}
-
-#[derive(Default)]
-struct SharedRounds(Mutex<Rounds>);
-
-impl SharedRounds {
-    fn lock(&self) -> MutexGuard<'_, Rounds> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Rounds {
@@ -227,7 +220,7 @@ impl Counter {
         if world.rank() > 0 {
             return Counter::Remote { asked: None };
         }
-        let (counter, ends) = (Arc::new(SharedRounds::default()), Arc::new(AtomicBool::new(false)));
+        let (counter, ends) = (Arc::<Mutex<Rounds>>::default(), Arc::new(AtomicBool::new(false)));
         let thread = std::thread::spawn({
             let (counter, ends) = (counter.clone(), ends.clone());
             move || {
@@ -236,7 +229,7 @@ impl Counter {
                     match world.any_process().immediate_matched_probe_with_tag(ASK) {
                         Some((message, asked)) => {
                             let (round, _) = message.matched_receive::<u64>();
-                            let number = counter.lock().take(round);
+                            let number = locked(&counter).take(round);
                             let asker = world.process_at_rank(asked.source_rank());
                             asker.send_with_tag(&number, NUMBER);
                         }
@@ -247,9 +240,7 @@ impl Counter {
         });
         Counter::Own { counter, ends, thread: Some(thread) }
     }
-}
 
-impl Counter {
     /// Receives what was asked for.
     fn end(&mut self) {
         if let Counter::Remote { asked: asked @ Some(_) } = self {

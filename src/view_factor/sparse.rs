@@ -30,10 +30,8 @@ use crate::work::Batches;
 /// Polygons of the first batch. Plain choice.
 const BATCH: usize = 32;
 
-/// Pairs of known blockers around the polygons of the pairs that are estimated by one thread, one
-/// after the other: what blocks a pair is clipped against one another, so that pairs with the
-/// ground of a city take far longer than others. Plain choice.
-const BLOCKERS_OF_PIECE: usize = 1 << 18;
+/// Pairs of a row that are estimated by one thread, one after the other. Plain choice.
+const PAIRS_OF_PIECE: usize = 64;
 
 /// Approximate size of a matrix, by the rays of some polygons: an overestimate where groups have
 /// many polygons.
@@ -89,18 +87,9 @@ pub(super) fn make(
     let (fronts, rows, known) = (&fronts, &rows, &known);
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
     let later = met_either_way(rows);
-    let mut pieces: Vec<(u32, &[Count])> = vec![];
-    for &s in wanted {
-        let blockers = |t: u32| (known[s as usize].len() + known[t as usize].len() + 1).pow(2);
-        let mut of_piece = 0;
-        let is_same_piece = |_: &Count, next: &Count| {
-            of_piece += blockers(next.polygon);
-            let is_same = of_piece < BLOCKERS_OF_PIECE;
-            of_piece *= usize::from(is_same);
-            is_same
-        };
-        pieces.extend(later[s as usize].chunk_by(is_same_piece).map(|piece| (s, piece)));
-    }
+    // The number of pairs of polygons varies by a factor of a thousand.
+    let pieces_of = |&s: &u32| later[s as usize].chunks(PAIRS_OF_PIECE).map(move |c| (s, c));
+    let pieces: Vec<(u32, &[Count])> = wanted.iter().flat_map(pieces_of).collect();
     making.rows_of_pieces(
         wanted,
         &pieces,

@@ -109,7 +109,6 @@ impl Journal {
         };
         // What was torn off when the program was killed.
         journal.file.set_len(whole).map_err(failed)?;
-        journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
         if whole == 0 {
             journal.buffer.extend(MAGIC);
             journal.buffer.extend(record(&parts));
@@ -131,10 +130,10 @@ impl Journal {
         let (start, len) = self.records.remove(&(number, first))?;
         let mut bytes = vec![0; len];
         let read = self.file.seek(SeekFrom::Start(start)).and_then(|_| {
-            self.file.read_exact(&mut bytes)?;
-            self.file.seek(SeekFrom::End(0))
+            let (file, bytes) = (&mut self.file, &mut bytes);
+            file.read_exact(bytes)
         });
-        read.ok().map(|_| bytes)
+        read.ok().map(|()| bytes)
     }
 
     /// Appends the results of loop `number` from item `first` on: by a record for each thread,
@@ -149,10 +148,15 @@ impl Journal {
         }
     }
 
+    fn append_buffer(&mut self) -> io::Result<()> {
+        self.file.seek(SeekFrom::End(0))?;
+        self.file.write_all(&self.buffer)
+    }
+
     /// Writes what is not in the file yet. A failure is kept: work goes on without a journal.
     fn flush(&mut self) {
         if self.failure.is_none()
-            && let Err(error) = self.file.write_all(&self.buffer)
+            && let Err(error) = self.append_buffer()
         {
             self.failure = Some(file_error(&self.path, &error));
         }

@@ -64,7 +64,7 @@ pub fn with_journal<T>(journal: &mut Option<Journal>, work: impl FnOnce() -> T) 
     };
     match TEAM.with_borrow(Option::is_some) {
         true => with(),
-        false => with_ranks(Box::new(Alone::default()), with),
+        false => with_ranks(Box::<Alone>::default(), with),
     }
 }
 
@@ -200,7 +200,6 @@ impl Team {
             return None;
         }
         let record = self.journal.as_mut().and_then(|journal| journal.take(number, first));
-        self.replays = false;
         let more = self.journal.as_ref().is_some_and(Journal::has_records);
         let (record, more) = match self.processes() {
             1 => (record, more),

@@ -9,9 +9,8 @@ fn spectra() -> &'static str {
     concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell_box.bands.json")
 }
 
-/// Bakes the Cornell box coarsely to `stem`, with more arguments.
-fn bake(stem: &Path, more: &[&str]) -> String {
-    let stem = stem.to_str().unwrap();
+/// Arguments of a coarse bake of the Cornell box to `stem`.
+fn coarse<'a>(stem: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let coarse = [
         "--cpu",
         "--gather",
@@ -23,7 +22,12 @@ fn bake(stem: &Path, more: &[&str]) -> String {
     ];
     let quick =
         ["--set", "solve.element_size=300", "--set", "rays=128", "--image", "32,32", "--out", stem];
-    let out = run("bake", &[&[cornell()], &coarse[..], &quick, more].concat());
+    [&[cornell()], &coarse[..], &quick, more].concat()
+}
+
+/// Bakes the Cornell box coarsely to `stem`, with more arguments.
+fn bake(stem: &Path, more: &[&str]) -> String {
+    let out = run("bake", &coarse(stem.to_str().unwrap(), more));
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     String::from_utf8(out.stdout).unwrap()
 }
@@ -87,6 +91,23 @@ fn bands_without_wavelengths_have_no_colours() {
     let ply = header(&stem.with_added_extension("bands.ply"));
     assert!(ply.contains("radiosity_visible") && ply.contains("error_heat"), "{ply}");
     assert!(!ply.contains("uchar red") && !stem.with_added_extension("bands.png").exists());
+}
+
+#[test]
+fn state_of_other_bands_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("box.state").display().to_string();
+    let of = |reflectance: &str| {
+        let text = r#"{"bands": [400], "materials": {"*": {"reflectance": R}}}"#;
+        write(folder.path(), "spectra.json", &text.replace('R', reflectance)).display().to_string()
+    };
+    let stem = folder.path().join("box");
+    let (same, other) = (of("0.5"), folder.path().join("other").display().to_string());
+    bake(&stem, &["--state", &state, "--bands", &same]);
+    bake(&stem, &["--state", &state, "--bands", &same]);
+    // The same path, with another content.
+    assert_eq!(of("0.6"), same);
+    refused(&coarse(&other, &["--state", &state, "--bands", &same]), &["box.state", "other"]);
 }
 
 #[test]

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use files::Files;
 use radiosity::bake::Outcome;
+use radiosity::bands::Bands;
 use radiosity::work::{Journal, JournalPart, is_first, with_journal};
 use radiosity::{Backend, BakeResult, BakeSettings, BakeTarget, Error, Rgb, Scene, Sky, kept_mesh};
 use settings::Adjustment;
@@ -156,7 +157,7 @@ impl Bake {
         let opening = Instant::now();
         let device = self.device.open()?;
         let baking = Instant::now();
-        let mut state = self.state(&scene, &device)?;
+        let mut state = self.state(&scene, bands.as_ref(), &device)?;
         let light = with_journal(&mut state, || {
             // Otherwise the bake drops the scene once it is cut.
             let kept = self.keep_mesh.then(|| scene.clone());
@@ -210,7 +211,12 @@ impl Bake {
 
     /// The state that the bake goes on from and adds to, if it is to have one: in the first of
     /// several processes.
-    fn state(&self, scene: &Scene, device: &Backend) -> Result<Option<Journal>, Stop> {
+    fn state(
+        &self,
+        scene: &Scene,
+        bands: Option<&Bands>,
+        device: &Backend,
+    ) -> Result<Option<Journal>, Stop> {
         let Some(path) = self.state.as_ref().filter(|_| is_first()) else { return Ok(None) };
         args::check_writable(path)?;
         let mut settings = BakeSettings::for_error(0.05, scene);
@@ -220,7 +226,7 @@ impl Bake {
             name: name.into(),
             hash: xxhash_rust::xxh3::xxh3_64(text.as_bytes()),
         };
-        let target = (self.target(), self.keep_mesh, &self.bands);
+        let target = (self.target(), self.keep_mesh, bands);
         let parts = [
             part("version of the program", env!("CARGO_PKG_VERSION").into()),
             part("scene or light", format!("{}", scene.fingerprint())),
