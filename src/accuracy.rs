@@ -22,6 +22,7 @@
 //! table of conditions in `accuracy/hidden.rs`.
 
 pub(crate) mod hidden;
+pub(crate) mod largest_first;
 pub(crate) mod mean_square;
 pub(crate) mod tail;
 

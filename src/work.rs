@@ -18,12 +18,18 @@
 //! does: [`with_ranks`], [`with_journal`]. Functions in between know nothing of them.
 
 mod batches;
+mod costs;
 mod journal;
 mod ranks;
+mod simulation;
 mod team;
 
 pub(crate) use batches::{Batches, map};
+pub use costs::Costs;
 pub use journal::{Journal, JournalPart};
 pub use ranks::{Alone, Ranks};
-pub use team::{agree, alone, from_first, is_first, with_journal, with_ranks};
+pub use simulation::{Cluster, SimulatedTime};
+pub use team::{
+    agree, alone, from_first, is_first, processes, with_costs, with_journal, with_ranks,
+};
 pub(crate) use team::{is_shared, now};

@@ -8,10 +8,8 @@
 //! through [`Ranks`]: parts of them are taken from a counter, which a thread of the first process
 //! serves, and results are exchanged.
 
-use std::cell::RefCell;
 use std::io::Write;
 use std::process::ExitCode;
-use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -32,8 +30,9 @@ const MAX_BYTES: usize = 1 << 30;
 const ASK: Tag = 1;
 const NUMBER: Tag = 2;
 
-/// Between two looks for messages that ask.
-const PAUSE: Duration = Duration::from_micros(200);
+/// Between two looks for messages that ask, after one and after a long time without any: a look
+/// takes some microseconds of a core.
+const PAUSES: [Duration; 2] = [Duration::from_micros(50), Duration::from_millis(1)];
 
 /// How long a process that failed waits for the others to end, too, before it ends them.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -58,17 +57,13 @@ pub fn run(program: impl FnOnce() -> ExitCode) -> ExitCode {
         SimpleCommunicator::world().abort(101);
     }));
     let mut errors = (world.rank() > 0).then(silence).flatten();
-    let counter = Rc::new(RefCell::new(Counter::new(&world)));
-    let mut ranks = World { all: world.duplicate(), counter: counter.clone() };
+    let mut ranks = World { all: world.duplicate(), counter: Counter::new(&world) };
     let places = ranks.places();
     if world.rank() == 0 {
         eprintln!("{} processes: {places}", world.size());
     }
     let code = with_ranks(Box::new(ranks), program);
     end_together(&world, code, errors.as_mut());
-    // The first process answers until all have what they asked for.
-    counter.borrow_mut().end();
-    world.barrier();
     code
 }
 
@@ -106,7 +101,7 @@ fn end_together(world: &SimpleCommunicator, code: ExitCode, errors: Option<&mut 
 /// All processes of the run.
 struct World {
     all: SimpleCommunicator,
-    counter: Rc<RefCell<Counter>>,
+    counter: Counter,
 }
 
 impl std::fmt::Debug for World {
@@ -163,24 +158,17 @@ impl Ranks for World {
         gathered
     }
 
+    fn ask(&mut self, round: u64) {
+        if let Counter::Remote = self.counter {
+            SimpleCommunicator::world().process_at_rank(0).send_with_tag(&round, ASK);
+        }
+    }
+
     fn take(&mut self, round: u64) -> u64 {
-        match &mut *self.counter.borrow_mut() {
+        match &self.counter {
             Counter::Own { counter, .. } => locked(counter).take(round),
-            Counter::Remote { asked } => {
-                let world = SimpleCommunicator::world();
-                let first = world.process_at_rank(0);
-                if *asked != Some(round) {
-                    // An answer that was asked for in a round that has ended.
-                    if asked.is_some() {
-                        first.receive_with_tag::<u64>(NUMBER);
-                    }
-                    first.send_with_tag(&round, ASK);
-                }
-                let (number, _) = first.receive_with_tag::<u64>(NUMBER);
-                // The next one comes while this part is worked at.
-                first.send_with_tag(&round, ASK);
-                *asked = Some(round);
-                number
+            Counter::Remote => {
+                SimpleCommunicator::world().process_at_rank(0).receive_with_tag::<u64>(NUMBER).0
             }
         }
     }
@@ -193,8 +181,8 @@ impl Ranks for World {
 enum Counter {
     /// In the first process, where a thread answers those that ask.
     Own { counter: Arc<Mutex<Rounds>>, ends: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
-    /// In others: the round for which a number was asked and has not been received.
-    Remote { asked: Option<u64> },
+    /// In others.
+    Remote,
 }
 
 /// A round, and the numbers of it that were taken.
@@ -218,13 +206,15 @@ impl Rounds {
 impl Counter {
     fn new(world: &SimpleCommunicator) -> Counter {
         if world.rank() > 0 {
-            return Counter::Remote { asked: None };
+            return Counter::Remote;
         }
         let (counter, ends) = (Arc::<Mutex<Rounds>>::default(), Arc::new(AtomicBool::new(false)));
         let thread = std::thread::spawn({
             let (counter, ends) = (counter.clone(), ends.clone());
             move || {
                 let world = SimpleCommunicator::world();
+                let [shortest, longest] = PAUSES;
+                let mut pause = shortest;
                 while !ends.load(Ordering::Relaxed) {
                     match world.any_process().immediate_matched_probe_with_tag(ASK) {
                         Some((message, asked)) => {
@@ -232,21 +222,17 @@ impl Counter {
                             let number = locked(&counter).take(round);
                             let asker = world.process_at_rank(asked.source_rank());
                             asker.send_with_tag(&number, NUMBER);
+                            pause = shortest;
                         }
-                        None => std::thread::sleep(PAUSE),
+                        None => {
+                            std::thread::sleep(pause);
+                            pause = (2 * pause).min(longest);
+                        }
                     }
                 }
             }
         });
         Counter::Own { counter, ends, thread: Some(thread) }
-    }
-
-    /// Receives what was asked for.
-    fn end(&mut self) {
-        if let Counter::Remote { asked: asked @ Some(_) } = self {
-            SimpleCommunicator::world().process_at_rank(0).receive_with_tag::<u64>(NUMBER);
-            *asked = None;
-        }
     }
 }
 

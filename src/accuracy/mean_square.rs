@@ -1,6 +1,6 @@
 //! The mean square error over an area, from points at random on it.
 
-use super::tail::Ranking;
+use super::tail::trimmed;
 
 /// Independent ways to decide whether a point is in the tail, and its square error by each.
 pub(crate) const SPLITS: usize = 6;
@@ -88,11 +88,10 @@ impl TrimmedSquare {
         for split in 0..SPLITS {
             let ranks: Vec<(f64, f64)> =
                 points.iter().map(|p| (p.area, p.error.splits[split].rank)).collect();
-            let ranking = Ranking::new(&ranks);
-            let shares = ranking.trimmed(tail).kept;
+            let shares = trimmed(&ranks, tail).kept;
             let value = |k: usize| points[k].error.splits[split].value;
             // The error at the cut, without noise: the mean over as much area around it.
-            let [above, below] = [0.5, 1.5].map(|share| ranking.trimmed(share * tail).kept);
+            let [above, below] = [0.5, 1.5].map(|share| trimmed(&ranks, share * tail).kept);
             let at_cut = |k: usize| points[k].area * (above[k] - below[k]);
             let area_at_cut: f64 = (0..points.len()).map(at_cut).sum();
             let cut = (0..points.len()).map(|k| at_cut(k) * value(k)).sum::<f64>()

@@ -25,7 +25,7 @@
 
 use glam::DVec3;
 
-use crate::accuracy::tail::{Ranking, Trimmed};
+use crate::accuracy::tail::{Trimmed, trimmed};
 use crate::scene::Rgb;
 
 /// Variance of the mean of two gathers over that of one, and of the linear interpolant between
@@ -282,7 +282,7 @@ fn split_off_tail(strata: &mut [StratumDeviations], further: &FurtherBounces, ta
     let point = |d: &Deviation| (d.area, further.error_square(d));
     let points: Vec<(f64, f64)> =
         strata.iter().flat_map(|s| s.deviations.iter().map(point)).collect();
-    let Trimmed { kept, cut } = Ranking::new(&points).trimmed(tail);
+    let Trimmed { kept, cut } = trimmed(&points, tail);
     let deviations = strata.iter_mut().flat_map(|s| &mut s.deviations);
     deviations.zip(kept).for_each(|(deviation, kept)| deviation.kept = kept);
     cut

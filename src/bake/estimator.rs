@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::accuracy::Measure;
 use crate::accuracy::hidden::LitRegion;
-use crate::accuracy::tail::Ranking;
+use crate::accuracy::tail::trimmed;
 use crate::bake::controller::TargetErrors;
 use crate::bake::error_estimate::{
     self, AVERAGED_VARIANCE, Conditions, ErrorEstimate, ErrorSpread, Estimate, GroupError,
@@ -206,7 +206,7 @@ impl ErrorEstimator<'_> {
         }
         let errors: Vec<(f64, f64)> =
             points.iter().map(|&(area, _, square)| (area, square)).collect();
-        let kept = Ranking::new(&errors).trimmed(self.measure.tail).kept;
+        let kept = trimmed(&errors, self.measure.tail).kept;
         // By area and by light: the larger, so that a dark plane does not hide a lit room.
         let mean = |weigh: fn(f64, f64) -> f64| {
             let (mut sum, mut weights) = (0.0, 0.0);

@@ -41,7 +41,8 @@ use super::two_sided::{TwoSidedPoint, gather_two_sided};
 use super::vertex_weights::vertex_weights;
 use super::{Gather, RadiosityField};
 use crate::accuracy::Measure;
-use crate::accuracy::tail::Ranking;
+use crate::accuracy::largest_first::in_order;
+use crate::accuracy::tail::trimmed;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::progress::StopReason;
@@ -591,7 +592,7 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
         (share.area, if is_known { share.square / share.area } else { 0.0 })
     };
     let errors: Vec<(f64, f64)> = shares.iter().map(error).collect();
-    let kept = Ranking::new(&errors).trimmed(tail).kept;
+    let kept = trimmed(&errors, tail).kept;
     let known = |of: &dyn Fn(usize) -> f64| -> f64 {
         let squares = shares.iter().enumerate().filter(|(_, share)| share.square.is_finite());
         squares.map(|(k, share)| of(k) * share.square).sum()
@@ -600,7 +601,6 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
     shares.retain(|share| share.square > 0.0);
     let order =
         |a: &Share, b: &Share| b.square.total_cmp(&a.square).then(a.element.cmp(&b.element));
-    shares.par_sort_unstable_by(order);
     // Dörfler (1996): 80 % of the error is split at a time, since the next gather may change the
     // rest.
     let (mut excess, mut bulk) = (counted - allowed * (1.0 - tail) * area, 0.8 * total);
@@ -617,7 +617,7 @@ fn bulk_above(mut shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usiz
         }
         true
     };
-    let marked = shares.into_iter().take_while(is_marked);
+    let marked = in_order(shares, order).take_while(is_marked);
     marked.map(|share| (share.square / area, share.element)).collect()
 }
 

@@ -13,10 +13,9 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
 use crate::geometry::aabb::Aabb;
 use crate::geometry::bvh::Bvh;
+use crate::work;
 
 /// Number of overlapping boxes above which a box is crowded: thousands of faces at one point. Plain
 /// choice, well above the number at a point of an ordinary mesh; no measurement was kept.
@@ -29,8 +28,7 @@ const MAX_OVERLAPS: usize = 256;
 pub(super) fn overlapping_pairs(boxes: &[Aabb], rank: impl Fn(usize) -> f64) -> Vec<Vec<u32>> {
     let tree = tree(boxes);
     let first_partners = |k: usize| first_partners(&tree, boxes, k);
-    let mut partners: Vec<Vec<u32>> =
-        (0..boxes.len()).into_par_iter().map(first_partners).collect();
+    let mut partners: Vec<Vec<u32>> = work::map(boxes.len(), first_partners);
     let crowded: Vec<bool> = partners.iter().map(|of_box| of_box.len() > MAX_OVERLAPS).collect();
     let mut ranked: Vec<u32> = (0..boxes.len() as u32).filter(|&k| crowded[k as usize]).collect();
     for &k in &ranked {

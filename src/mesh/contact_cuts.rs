@@ -31,6 +31,7 @@ use super::contacts::{TrianglePlane, outer_edges};
 use super::{Cell, Mesh, Side, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::{Piece, Scene, longest_edge};
+use crate::work;
 use openness::Openness;
 use snapping::{Cuts, STEPS, Snapping};
 use triangulation::CutTriangle;
@@ -133,7 +134,7 @@ fn find_cuts(scene: &Scene, topology: &SurfaceTopology, finest: f64) -> Vec<Cuts
         segments.retain(|segment| openness.is_worth_a_cut(segment, corners));
         Snapping::new(corners, SNAP_DISTANCE * shortest).cuts(&segments)
     };
-    (0..count).into_par_iter().map(cuts).collect()
+    work::map(count, cuts)
 }
 
 /// Per triangle and side, the triangle that the surface continues to.

@@ -15,13 +15,13 @@
 //! 3. The quadtree of each triangle is descended along its segments.
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::box_overlap::overlapping_pairs;
 use super::{Cell, Mesh, SurfaceTopology};
 use crate::geometry::aabb::Aabb;
 use crate::scene::{Scene, longest_edge};
+use crate::work;
 
 /// Least depth of a segment in an element for separating it, as a barycentric weight: a segment
 /// along the element's edge does not. Plain choice; no measurement was kept.
@@ -82,7 +82,7 @@ impl Mesh {
             separated
         };
         let separated: FxHashSet<(usize, Cell)> =
-            (0..count).into_par_iter().flat_map_iter(separated_in).collect();
+            work::map(count, separated_in).into_iter().flatten().collect();
         let deeper = |t: usize, cell: Cell| {
             cell.level < self.level_at(t, cell) || separated.contains(&(t, cell))
         };

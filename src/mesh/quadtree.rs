@@ -1,13 +1,13 @@
 //! One cell of a triangle's quadtree: its position, corners, children and parent.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A cell of the midpoint subdivision of a triangle.
 ///
 /// At level `l` the triangle is a lattice of 2ˡ steps along its barycentric axes u and v (weights
 /// of the second and third corner). An upright cell has the corners (i, j), (i+1, j), (i, j+1); a
 /// flipped one (i+1, j+1), (i, j+1), (i+1, j). Both wind like the triangle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(crate) struct Cell {
     pub level: u32,
     pub i: u32,

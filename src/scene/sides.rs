@@ -14,6 +14,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::texture::MaterialTextures;
 use super::{Material, Rgb, Scene};
 
@@ -35,7 +37,7 @@ pub enum Sides {
 }
 
 /// Treatment of a triangle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Treatment {
     /// Left out.
     pub dropped: bool,

@@ -29,11 +29,11 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::geometry::polygon::{polygon_area, polygon_difference};
 use crate::sampling::hash::split_mix64;
 use crate::scene::{Scene, Sides, Treatment, Warning, WarningKind};
+use crate::work;
 use closed_rooms::closed_rooms;
 use lamp_backs::LampBacks;
 use repeated::repeated_triangles;
@@ -118,15 +118,16 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> (Vec<Treatment>, Option<Warning
     let mut light = sheets.sample(&all, to_light);
     // Elsewhere the result is that of the sheets: one of the sides is dark, and the other surely
     // reaches the share that counts as lit, or nothing.
-    let in_doubt = |t: &usize| {
+    let in_doubt = |t: usize| {
         let [front, back] = [2 * t, 2 * t + 1].map(|side| light.of_sheet(side));
         let is_unsure = |s: Samples| s.hits > 0.0 && s.share() < 3.0 * LIT_SHARE;
         let are_both_lit = front.hits > 0.0 && back.hits > 0.0;
-        let is_covered = || walks.has_light() && is_covered(&walks, *t);
+        let is_covered = || walks.has_light() && is_covered(&walks, t);
         are_both_lit || is_unsure(front) || is_unsure(back) || is_covered()
     };
-    let in_doubt: Vec<usize> = (0..count).into_par_iter().filter(in_doubt).collect();
-    let in_doubt: Vec<SideIndex> = in_doubt.into_iter().flat_map(|t| [2 * t, 2 * t + 1]).collect();
+    let are_in_doubt = work::map(count, in_doubt);
+    let in_doubt = (0..count).filter(|&t| are_in_doubt[t]);
+    let in_doubt: Vec<SideIndex> = in_doubt.flat_map(|t| [2 * t, 2 * t + 1]).collect();
     light.add_points(&in_doubt, to_light);
     let lit = LitSides::new(scene, &light, &all);
     let is_room = closed_rooms(scene);
@@ -166,7 +167,7 @@ fn treatments(scene: &Scene, sides: &[Sides]) -> (Vec<Treatment>, Option<Warning
             shines_on_both,
         }
     };
-    ((0..count).map(treatment).collect(), backs.warning(scene, &walks, &lit.is_lit))
+    (work::map(count, treatment), backs.warning(scene, &walks, &lit.is_lit))
 }
 
 /// The sides that light reaches.

@@ -1,13 +1,15 @@
 //! A long list of like items, in batches of similar duration.
 
 use std::ops::Range;
+use std::panic::Location;
 use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::team;
+use super::costs::Batch;
+use super::team::{self, Site};
 use crate::progress::Instant;
 
 /// Batches grow or shrink towards this duration, so that progress is reported several times a
@@ -15,8 +17,8 @@ use crate::progress::Instant;
 const BATCH_DURATION: Duration = Duration::from_millis(250);
 const SHARED_BATCH_DURATION: Duration = Duration::from_secs(1);
 
-/// Items of a part of [`map`], at least: a fraction of a millisecond. Plain choice.
-const ITEMS_OF_PART: usize = 512;
+/// Items of a part of [`map`], at least. Plain choice.
+const ITEMS_OF_PART: usize = 64;
 
 /// Splits lists of like items into batches of similar duration, and has their results computed:
 /// here, by other processes, or in an earlier run. Results must not depend on batch ends, which
@@ -27,6 +29,8 @@ pub(crate) struct Batches {
     least: usize,
     /// Number among the loops of the program; none in work that is shared as a whole.
     number: Option<u64>,
+    /// Where the loop is in the code.
+    site: Site,
     /// Whether results are kept in a journal.
     is_kept: bool,
     /// Items done so far.
@@ -39,9 +43,10 @@ enum Never {}
 
 impl Batches {
     /// The first batch has `first` items.
+    #[track_caller]
     pub fn new(first: usize) -> Batches {
-        let number = team::next_loop();
-        Batches { size: first.max(1), least: 1, number, is_kept: true, done: 0 }
+        let (number, site) = (team::next_loop(), Location::caller());
+        Batches { size: first.max(1), least: 1, number, site, is_kept: true, done: 0 }
     }
 
     /// As many items at least, all but in the last batch: those that are done at once, each by one
@@ -95,15 +100,17 @@ impl Batches {
                             self.size = team.largest(self.size);
                         }
                         let processes = team.processes();
-                        let count = remaining.len().min(self.size.saturating_mul(processes));
-                        let least = self.least.div_ceil(processes);
-                        let (results, duration) =
-                            team.share_out(count, least, &mut |part| work(&remaining[part]))?;
-                        let wanted = match processes {
-                            1 => BATCH_DURATION,
-                            _ => SHARED_BATCH_DURATION,
+                        let batch = Batch {
+                            of: Some(number),
+                            size: self.size as u64,
+                            least: self.least as u64,
+                            remaining: remaining.len() as u64,
+                            ..Batch::default()
                         };
-                        self.adapt(duration, wanted, count == self.size.saturating_mul(processes));
+                        let count = batch_len(self.size, processes, remaining.len());
+                        let work = &mut |part: Range<usize>| work(&remaining[part]);
+                        let (results, duration) = team.share_out(self.site, batch, count, work)?;
+                        self.size = adapted(self.size, self.least, duration, processes, count);
                         if self.is_kept {
                             team.record(number, self.done, &results);
                         }
@@ -112,10 +119,10 @@ impl Batches {
                 }
             }
             None => {
-                let count = remaining.len().min(self.size);
+                let count = batch_len(self.size, 1, remaining.len());
                 let start = Instant::now();
                 let results = work(&remaining[..count])?;
-                self.adapt(start.elapsed(), BATCH_DURATION, count == self.size);
+                self.size = adapted(self.size, self.least, start.elapsed(), 1, count);
                 (count, results)
             }
         };
@@ -125,31 +132,50 @@ impl Batches {
         *remaining = rest;
         Ok((batch, results))
     }
+}
 
-    /// After a batch that took too long the next is half as large; after a full one that took less
-    /// than a third of what is `wanted`, twice as large.
-    fn adapt(&mut self, duration: Duration, wanted: Duration, is_full: bool) {
-        if duration > wanted {
-            self.size = (self.size / 2).max(self.least);
-        } else if duration < wanted / 3 && is_full {
-            self.size *= 2;
-        }
+/// Items of the next batch of `remaining` ones, if each of the processes is to have `size`.
+pub(super) fn batch_len(size: usize, processes: usize, remaining: usize) -> usize {
+    remaining.min(size.saturating_mul(processes))
+}
+
+/// The size after a batch of `count` items for which processes took as long: half of it after one
+/// that took too long, twice as much after a full one that took less than a third of what is
+/// wanted.
+pub(super) fn adapted(
+    size: usize,
+    least: usize,
+    duration: Duration,
+    processes: usize,
+    count: usize,
+) -> usize {
+    let wanted = if processes == 1 { BATCH_DURATION } else { SHARED_BATCH_DURATION };
+    let is_full = count == size.saturating_mul(processes);
+    if duration > wanted {
+        (size / 2).max(least)
+    } else if duration < wanted / 3 && is_full {
+        size.saturating_mul(2)
+    } else {
+        size
     }
 }
 
 /// The results of `work` for the numbers below `count`, in their order, by all threads and
 /// processes. They are not kept in a journal. Worth it where an item takes longer than to exchange
 /// its result: some tens of nanoseconds.
+#[track_caller]
 pub(crate) fn map<R: Send + Serialize + DeserializeOwned>(
     count: usize,
     work: impl Fn(usize) -> R + Sync,
 ) -> Vec<R> {
     match team::borrow() {
-        Some(mut team) if team.processes() > 1 => {
+        Some(mut team) if team.is_divided() => {
             let work = &mut |part: Range<usize>| -> Result<Vec<R>, Never> {
                 Ok(part.into_par_iter().map(&work).collect())
             };
-            let Ok((results, _)) = team.share_out(count, ITEMS_OF_PART, work);
+            let least = (ITEMS_OF_PART * team.processes()) as u64;
+            let batch = Batch { least, remaining: count as u64, ..Batch::default() };
+            let Ok((results, _)) = team.share_out(Location::caller(), batch, count, work);
             results
         }
         _ => (0..count).into_par_iter().map(&work).collect(),

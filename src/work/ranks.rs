@@ -5,7 +5,7 @@ use std::fmt;
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
 /// Every process makes the same calls in the same order, but for the number of calls of
-/// [`Ranks::take`] in a round.
+/// [`Ranks::ask`] and [`Ranks::take`] in a round.
 pub trait Ranks: fmt::Debug {
     /// Index of this process, from 0.
     fn rank(&self) -> usize;
@@ -16,8 +16,14 @@ pub trait Ranks: fmt::Debug {
     /// Sends `bytes` to all processes; returns the bytes of all of them, by rank.
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;
 
+    /// Asks for a number that [`Ranks::take`] is to give, so that it comes while this process works.
+    fn ask(&mut self, round: u64) {
+        _ = round;
+    }
+
     /// The next number of the counter of this `round`, which all processes share: from 0, each
-    /// number once. Rounds ascend, and each ends with a call of [`Ranks::all_gather`].
+    /// number once. It was asked for before. Rounds ascend, and each ends with a call of
+    /// [`Ranks::all_gather`].
     fn take(&mut self, round: u64) -> u64;
 }
 

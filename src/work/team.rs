@@ -1,12 +1,15 @@
 //! The processes and the journal of the program that runs in a thread.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::ops::{ControlFlow, Deref, DerefMut, Range};
+use std::panic::Location;
 use std::time::Duration;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::costs::{Batch, Costs, Recorder};
 use super::journal::Journal;
 use super::ranks::{Alone, Ranks};
 use crate::progress::Instant;
@@ -14,6 +17,9 @@ use crate::progress::Instant;
 thread_local! {
     static TEAM: RefCell<Option<Box<Team>>> = const { RefCell::new(None) };
 }
+
+/// Where a loop is in the code: those of one site have items of similar cost.
+pub(super) type Site = &'static Location<'static>;
 
 /// Processes, a journal, and what all processes agree upon.
 pub(super) struct Team {
@@ -29,6 +35,9 @@ pub(super) struct Team {
     start: Instant,
     /// The clock of process 0 at the last exchange, since its start.
     agreed: Duration,
+    /// Seconds of an item at each site, as all processes together measured it last.
+    costs: HashMap<Site, f64>,
+    recorder: Option<Recorder>,
 }
 
 /// What a process says of itself in every exchange.
@@ -68,6 +77,23 @@ pub fn with_journal<T>(journal: &mut Option<Journal>, work: impl FnOnce() -> T) 
     }
 }
 
+/// Runs `work`, and records its costs, in a single process.
+pub fn with_costs<T>(work: impl FnOnce() -> T) -> (T, Costs) {
+    let record = |recorder: Option<Recorder>| {
+        let mut team = borrow()?;
+        std::mem::replace(&mut team.recorder, recorder)
+    };
+    let recorded = || {
+        record(Some(Recorder::new()));
+        let done = work();
+        (done, record(None).map(Recorder::finish).unwrap_or_default())
+    };
+    match TEAM.with_borrow(Option::is_some) {
+        true => recorded(),
+        false => with_ranks(Box::<Alone>::default(), recorded),
+    }
+}
+
 /// What `work` makes in the first process, in all of them: what only that one can read.
 ///
 /// # Errors
@@ -78,7 +104,7 @@ where
     E: Serialize + DeserializeOwned,
 {
     match borrow() {
-        Some(mut team) if team.processes() > 1 => {
+        Some(mut team) if team.is_divided() => {
             let made = (team.ranks.rank() == 0).then(work);
             let all = team.exchange(Duration::ZERO, &made).1;
             all.into_iter().flatten().next().unwrap_or_else(|| unreachable!("the first has it"))
@@ -93,9 +119,14 @@ pub fn alone<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Whether other processes take part.
+/// Number of processes.
+pub fn processes() -> usize {
+    borrow().map_or(1, |team| team.processes())
+}
+
+/// Whether other processes take part, or costs are recorded as if they did.
 pub(crate) fn is_shared() -> bool {
-    borrow().is_some_and(|team| team.processes() > 1)
+    borrow().is_some_and(|team| team.is_divided())
 }
 
 /// Whether this process is the first, which prints and writes.
@@ -114,7 +145,7 @@ pub(crate) fn now() -> Instant {
 /// Whether to go on, by what this process and all others say: a break of one stops all.
 pub fn agree(flow: ControlFlow<()>) -> ControlFlow<()> {
     match borrow() {
-        Some(mut team) if team.processes() > 1 => {
+        Some(mut team) if team.is_divided() => {
             let breaks = team.exchange(Duration::ZERO, &flow.is_break()).1;
             if breaks.contains(&true) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         }
@@ -168,11 +199,18 @@ impl Team {
             rounds: 0,
             start: Instant::now(),
             agreed: Duration::ZERO,
+            costs: HashMap::new(),
+            recorder: None,
         }
     }
 
     pub fn processes(&self) -> usize {
         self.ranks.size()
+    }
+
+    /// Whether work is shared out, or is to be recorded as if it were.
+    pub fn is_divided(&self) -> bool {
+        self.processes() > 1 || self.recorder.is_some()
     }
 
     /// The largest of the sizes of all processes.
@@ -218,15 +256,15 @@ impl Team {
     }
 
     /// The results of `work` for `count` items, one each, and the mean time that a process worked.
-    /// Parts of at least `least` items are taken by whichever process is free, the larger ones
-    /// first.
+    /// Parts of the `batch` are taken by whichever process is free, the larger ones first.
     ///
     /// # Errors
     /// That of the first process that has one.
     pub fn share_out<R, E>(
         &mut self,
+        site: Site,
+        batch: Batch,
         count: usize,
-        least: usize,
         work: &mut dyn FnMut(Range<usize>) -> Result<Vec<R>, E>,
     ) -> Result<(Vec<R>, Duration), E>
     where
@@ -236,22 +274,33 @@ impl Team {
         let processes = self.processes();
         let start = Instant::now();
         if processes == 1 {
-            let results = work(0..count)?;
+            let results = match &mut self.recorder {
+                Some(recorder) => recorder.batch(batch, count, work)?,
+                None => work(0..count)?,
+            };
             return Ok((results, start.elapsed()));
         }
-        let parts = parts(count, processes, least);
+        let least = (batch.least as usize).div_ceil(processes);
+        let parts = parts(count, processes, least, self.costs.get(&site).copied());
         let mut own: Result<Vec<(u32, Vec<R>)>, E> = Ok(vec![]);
         self.rounds += 1;
         // The first part of each process needs no counter.
         let mut k = self.ranks.rank();
         while let (Some(part), Ok(done)) = (parts.get(k), &mut own) {
+            if parts.len() > processes {
+                self.ranks.ask(self.rounds);
+            }
             match work(part.clone()) {
                 Ok(results) => done.push((k as u32, results)),
                 Err(error) => own = Err(error),
             }
+            if parts.len() <= processes {
+                break;
+            }
             k = processes + self.ranks.take(self.rounds) as usize;
         }
         let (busy, of_all) = self.exchange(start.elapsed(), &own);
+        self.costs.insert(site, busy.as_secs_f64() * processes as f64 / count.max(1) as f64);
         let mut by_part: Vec<(u32, Vec<R>)> = vec![];
         for results in of_all {
             by_part.extend(results?);
@@ -267,7 +316,11 @@ impl Team {
         message: &M,
     ) -> (Duration, Vec<M>) {
         let report = Report { clock: self.start.elapsed(), busy };
-        let all = self.ranks.all_gather(&bytes_of(&(report, message)));
+        let bytes = bytes_of(&(report, message));
+        if let Some(recorder) = &mut self.recorder {
+            recorder.exchange(bytes.len());
+        }
+        let all = self.ranks.all_gather(&bytes);
         let decoded = |bytes: &Vec<u8>| -> (Report, M) {
             postcard::from_bytes(bytes).expect("all processes run the same program")
         };
@@ -282,13 +335,25 @@ impl Team {
 /// processes, where items are alike, and a process is not held up by asking for parts.
 const LAST_PARTS: usize = 64;
 
+/// Seconds of a part, at least: about the time in which a process gets the number of its next one.
+const SHORTEST_PART: f64 = 1e-3;
+
 /// The parts of `count` items for `processes` that take them on demand: half of an even share of
-/// what is left, and `least` at least.
+/// what is left, and `least` at least. Items take `cost` seconds, if that is known: what takes few
+/// milliseconds is divided evenly.
 ///
 /// Source: Polychronopoulos, Kuck 1987, guided self-scheduling; with half of its parts, since items
 /// differ.
-fn parts(count: usize, processes: usize, least: usize) -> Vec<Range<usize>> {
-    let least = least.max(count / (processes * LAST_PARTS));
+pub(super) fn parts(
+    count: usize,
+    processes: usize,
+    least: usize,
+    cost: Option<f64>,
+) -> Vec<Range<usize>> {
+    // A cost of zero gives infinity, which becomes the largest number.
+    let long =
+        cost.map_or(1, |cost| (SHORTEST_PART / cost) as usize).min(count.div_ceil(processes));
+    let least = least.max(count / (processes * LAST_PARTS)).max(long);
     let mut parts = vec![];
     let mut start = 0;
     while start < count {
@@ -299,7 +364,7 @@ fn parts(count: usize, processes: usize, least: usize) -> Vec<Range<usize>> {
     parts
 }
 
-fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
+pub(super) fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
     postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
 }
 
@@ -310,11 +375,23 @@ mod tests {
     #[test]
     fn parts_cover_all_items_once_the_larger_first() {
         for (count, processes, least) in [(1, 2, 1), (1000, 2, 1), (1000, 64, 8), (7, 3, 100)] {
-            let parts = parts(count, processes, least);
+            let parts = parts(count, processes, least, None);
             let items: Vec<usize> = parts.iter().cloned().flatten().collect();
             assert!(items.into_iter().eq(0..count));
             assert!(parts.is_sorted_by(|a, b| a.len() >= b.len()));
             assert!(parts[0].len() <= least.max(count.div_ceil(2 * processes)));
         }
+    }
+
+    #[test]
+    fn short_work_is_divided_evenly() {
+        let sizes = |cost| {
+            let parts = parts(1000, 4, 1, Some(cost));
+            parts.iter().map(|part| part.len()).collect::<Vec<_>>()
+        };
+        // Four milliseconds, and less; of a second the last parts take a millisecond.
+        assert_eq!([sizes(4e-6), sizes(0.0)], [[250; 4], [250; 4]]);
+        let long = sizes(1e-3);
+        assert_eq!((long[0], long.len() > 16, *long.last().unwrap()), (125, true, 3));
     }
 }

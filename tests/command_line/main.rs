@@ -13,6 +13,7 @@ mod light;
 mod light_map;
 mod luminaires;
 mod output;
+mod scaling;
 mod sky;
 mod trade_off;
 mod usage;

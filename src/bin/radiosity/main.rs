@@ -12,6 +12,7 @@
 //! radiosity trade-off     SCENE.obj    error over time         -> CSV, PNG
 //! radiosity verify        SCENE.obj …  error of a solution     -> CSV, PLY
 //! radiosity info          STEM.json    whether files are of one run
+//! radiosity scaling       COSTS.json   time of a run on many processes
 //! ```
 //!
 //! Results go to files, summaries to standard output, progress, warnings and errors to standard
@@ -42,6 +43,7 @@ mod measured_sky;
 mod probes;
 mod progress;
 mod report;
+mod scaling;
 mod scene_options;
 mod sky;
 mod standard;
@@ -55,6 +57,7 @@ mod viewer_options;
 #[path = "../../../mpi/src/world.rs"]
 mod world;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use args::Stop;
@@ -68,6 +71,9 @@ use view_factors::merge;
 struct Program {
     #[command(subcommand)]
     command: Command,
+    /// Write what the tasks of the run cost to this file, for `radiosity scaling`
+    #[arg(long, global = true, hide = true, value_name = "FILE")]
+    costs: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -83,6 +89,7 @@ enum Command {
     TradeOff(Box<trade_off::Options>),
     Verify(Box<verify::Options>),
     Info(info::Options),
+    Scaling(scaling::Options),
 }
 
 #[cfg(not(feature = "mpi"))]
@@ -102,11 +109,24 @@ fn run() -> ExitCode {
         let name = matches.subcommand_name().unwrap_or_default().to_string();
         Ok((name, Program::from_arg_matches_mut(&mut matches)?))
     });
-    let (name, Program { command }) = match parsed {
+    let (name, Program { command, costs }) = match parsed {
         Ok(parsed) => parsed,
         Err(error) => return args::print(&error),
     };
-    let done = match command {
+    let done = match costs {
+        Some(path) => scaling::recorded(&path, || run_command(command)),
+        None => run_command(command),
+    };
+    let unwritten = progress::report_unwritten();
+    match done {
+        Ok(()) | Err(Stop::Missed | Stop::Interrupted) if unwritten => ExitCode::FAILURE,
+        Ok(()) => ExitCode::SUCCESS,
+        Err(stop) => stop.report(program.find_subcommand_mut(name).expect("it was run")),
+    }
+}
+
+fn run_command(command: Command) -> Result<(), Stop> {
+    match command {
         Command::Bake(options) => options.run(),
         Command::LightMap(options) => options.run(),
         Command::ViewFactors(options) => options.run(),
@@ -118,12 +138,7 @@ fn run() -> ExitCode {
         Command::TradeOff(options) => options.run(),
         Command::Verify(options) => options.run(),
         Command::Info(options) => options.run(),
-    };
-    let unwritten = progress::report_unwritten();
-    match done {
-        Ok(()) | Err(Stop::Missed | Stop::Interrupted) if unwritten => ExitCode::FAILURE,
-        Ok(()) => ExitCode::SUCCESS,
-        Err(stop) => stop.report(program.find_subcommand_mut(name).expect("it was run")),
+        Command::Scaling(options) => options.run(),
     }
 }
 

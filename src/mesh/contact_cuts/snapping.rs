@@ -5,6 +5,7 @@
 
 use glam::{DVec2, DVec3};
 use rustc_hash::{FxHashMap, FxHashSet};
+use serde::{Deserialize, Serialize};
 
 use crate::mesh::contacts::{ContactSegment, part_inside};
 
@@ -15,7 +16,7 @@ pub(super) const STEPS: u32 = 1 << 24;
 pub(super) type LatticePoint = [u32; 2];
 
 /// The cuts of a triangle.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Cuts {
     pub segments: Vec<[LatticePoint; 2]>,
     /// Points on each side, steps from its first corner.

@@ -1,11 +1,12 @@
 //! Sheets: connected sides of triangles.
 
 use fastrand::Rng;
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::union_find::UnionFind;
 use crate::sampling::hash::split_mix64;
 use crate::scene::{HalfEdge, Scene};
+use crate::work;
 
 /// A sheet is dark if a smaller share of the walks from it reaches light. The share is 3 to 5 % in
 /// the gap between the Cornell box's lamp and its ceiling, and almost 0 through seams; in the
@@ -104,7 +105,9 @@ impl SideStatistics<'_> {
         count: impl Fn(f64, &mut Rng) -> usize + Sync,
         find: impl Fn(SideIndex, &mut Rng) -> Option<f64> + Sync,
     ) {
-        let from_side = |(&side, density): (&SideIndex, f64)| {
+        let densities: Vec<f64> = self.sheets.densities(sides);
+        let from_side = |k: usize| {
+            let (side, density) = (sides[k], densities[k]);
             let mut rng = Rng::with_seed(split_mix64(side as u64) ^ stream);
             let points = count(density, &mut rng);
             let mut samples = Samples { points: points as f64, ..Samples::default() };
@@ -112,12 +115,9 @@ impl SideStatistics<'_> {
                 samples.hits += 1.0;
                 samples.sum += value;
             }
-            (side, samples)
+            samples
         };
-        let densities = self.sheets.densities(sides);
-        let samples: Vec<(SideIndex, Samples)> =
-            sides.par_iter().zip(densities).map(from_side).collect();
-        for (side, samples) in samples {
+        for (&side, samples) in sides.iter().zip(work::map(sides.len(), from_side)) {
             self.of_sides[side].add(samples);
             self.of_sheets[self.sheets.first[side]].add(samples);
         }
@@ -135,7 +135,7 @@ impl SideStatistics<'_> {
 }
 
 /// Results at some points.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Samples {
     /// Number of points.
     pub points: f64,
