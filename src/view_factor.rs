@@ -70,7 +70,8 @@ pub use self::partial_matrix::PartialMatrix;
 impl ViewFactors {
     /// The matrix of `scene` with two absolute standard errors of at most `error` on every factor,
     /// or far smaller ones: [`ViewFactors::exact`] unless that would take minutes, else
-    /// [`ViewFactors::sparse`]. [`ViewFactors::absent`] tells the two apart.
+    /// [`ViewFactors::sparse`]. [`ViewFactors::absent`] tells the two apart. Of several processes
+    /// ([`crate::work`]) the first has the matrix, and others none.
     ///
     /// The time is predicted from cubature of up to a few thousand pairs.
     ///
@@ -198,7 +199,7 @@ impl PartialMatrix {
     ///
     /// `progress` is
     /// called with the rows done, the number of polygons done and their total, and may stop the
-    /// work: the rows done so far are returned.
+    /// work: the rows done so far are returned. Of several processes the first has the rows.
     ///
     /// # Errors
     /// [`ErrorKind::Setting`] when `error` is not in (0, 1), a group or a row does not exist, or

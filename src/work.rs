@@ -18,6 +18,7 @@
 //! does: [`with_ranks`], [`with_journal`]. Functions in between know nothing of them.
 
 mod batches;
+mod blocks;
 mod costs;
 mod journal;
 mod ranks;
@@ -25,6 +26,7 @@ mod simulation;
 mod team;
 
 pub(crate) use batches::{Batches, map};
+pub(crate) use blocks::{is_own, map_blocks};
 pub use costs::Costs;
 pub use journal::{Journal, JournalPart};
 pub use ranks::{Alone, Ranks};

@@ -159,6 +159,7 @@ impl<'a> Gathering<'a> {
                 let reflected = &converged.reflected;
                 (GatheredVertex::new(&self.lookup, material, row, reflected), row.buried)
             },
+            |_, made| made,
             |done| progress(scattering.len() + done, of),
         );
         let Some(many) = many else { return Ok(None) };
@@ -199,6 +200,7 @@ impl<'a> Gathering<'a> {
                 let material = materials[v as usize].unwrap_or_default();
                 (VertexEquation::new(&self.lookup, material, row), row.buried)
             },
+            |_, equation| equation,
             &mut progress,
         )?;
         let dark = || VertexEquation::dark(self.bands);

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::linear::gauss_seidel::{self, BLOCK, Equations};
 use crate::scene::Rgb;
+use crate::work;
 
 /// Maximum share of its light that a vertex misses for bounces that are omitted: far below all
 /// requested errors, so that results hardly depend on it.
@@ -65,6 +66,11 @@ impl Equations for [Equation] {
     }
 }
 
+/// Whether this process evaluates equation `k`: others need not have its terms.
+pub(crate) fn is_own(k: usize) -> bool {
+    work::is_own(k / BLOCK)
+}
+
 /// The light that each vertex reflects after all bounces, W/m². Sweeps begin with darkness, and end
 /// when no vertex misses more than [`PRECISION`] of its light, or of `floor` (W/m²) where it is
 /// darker; or after 1000
@@ -75,7 +81,14 @@ pub(crate) fn converge(equations: &[Equation], floor: f64) -> Vec<Rgb> {
     let allowed = PRECISION * (1.0 - albedo).max(PRECISION);
     let mut reflected = vec![0.0; 3 * equations.len()];
     for _ in 0..1000 {
-        let next = gauss_seidel::sweep(equations, &reflected, 3, BLOCK);
+        let swept = |block: usize| {
+            let first = block * BLOCK;
+            let end = equations.len().min(first + BLOCK);
+            let mut values = reflected[3 * first..3 * end].to_vec();
+            gauss_seidel::sweep_block(equations, &reflected, 3, first, &mut values);
+            values
+        };
+        let next = work::map_blocks(equations.len().div_ceil(BLOCK), swept).concat();
         let pairs = reflected.par_chunks(3).zip(next.par_chunks(3));
         let is_converged = pairs
             .map(|pair| (Rgb::from_slice(pair.0), Rgb::from_slice(pair.1)))

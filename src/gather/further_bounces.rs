@@ -8,7 +8,7 @@
 use std::ops::ControlFlow;
 
 use super::RadiosityField;
-use super::exchange::{Equation, Term, converge};
+use super::exchange::{Equation, Term, converge, is_own};
 use super::point_row::{PointRow, PointRows, SurfaceHit, SurfaceRows};
 use super::sampled_mesh::SampledMesh;
 use super::vertex_rows::{VertexRow, VertexRows};
@@ -41,7 +41,11 @@ impl GatheredFrom<'_> {
         let all = 0..vertices.positions.len() as u32;
         let gathering: Vec<u32> = all.filter(|&v| rows.albedo(v) != Rgb::ZERO).collect();
         let equation = |v: u32, row: &VertexRow| self.equation(&rows, v, row);
-        let mut equations = rows.map(&gathering, 1, equation, progress)?;
+        let keep = |v: u32, equation: Equation| match is_own(v as usize) {
+            true => equation,
+            false => Equation { terms: vec![], ..equation },
+        };
+        let mut equations = rows.map(&gathering, 1, equation, keep, progress)?;
         equations.reserve_exact(vertices.positions.len() - gathering.len());
         equations.resize_with(vertices.positions.len(), Equation::default);
         for (k, &v) in gathering.iter().enumerate().rev() {

@@ -62,12 +62,13 @@ impl<'a> VertexRows<'a> {
     }
 
     /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
-    /// rays; none if `progress`, called after each batch with the number done, breaks.
+    /// rays; what this process is to `keep` of them, each batch after it was made; none if `progress`, called after each batch with the number done, breaks.
     pub fn map<T: Send + Sync + Serialize + DeserializeOwned>(
         &self,
         vertices: &[u32],
         parts: u32,
         work: impl Fn(u32, &VertexRow) -> T + Sync,
+        keep: impl Fn(u32, T) -> T,
         mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Option<Vec<T>> {
         let mut results = Vec::with_capacity(vertices.len());
@@ -77,7 +78,8 @@ impl<'a> VertexRows<'a> {
             let made = |&v: &u32| work(v, &self.row(v, parts));
             let (_, made) = batches
                 .next(&mut remaining, |batch| batch.par_iter().map(made).collect::<Vec<T>>());
-            results.extend(made);
+            let kept = vertices[results.len()..].iter().zip(made).map(|(&v, made)| keep(v, made));
+            results.extend(kept);
             if agree(progress(results.len())).is_break() {
                 return None;
             }

@@ -38,18 +38,28 @@ pub fn sweep(
     block: usize,
 ) -> Vec<f64> {
     let mut after = before.to_vec();
-    after.par_chunks_mut(block * width).enumerate().for_each(|(number, values)| {
-        let first = number * block;
-        let mut value = vec![0.0; width];
-        for k in 0..values.len() / width {
-            let x = |j: usize| {
-                let of_block = j.checked_sub(first).map(|j| j * width..(j + 1) * width);
-                let of_block = of_block.and_then(|range| values.get(range));
-                of_block.unwrap_or_else(|| &before[j * width..][..width])
-            };
-            equations.evaluate(first + k, x, &mut value);
-            values[k * width..][..width].copy_from_slice(&value);
-        }
-    });
+    let blocks = after.par_chunks_mut(block * width).enumerate();
+    blocks.for_each(|(k, values)| sweep_block(equations, before, width, k * block, values));
     after
+}
+
+/// The same for the block from the unknown `first` on, whose `values` are those before, and become
+/// those after.
+pub fn sweep_block(
+    equations: &(impl Equations + ?Sized),
+    before: &[f64],
+    width: usize,
+    first: usize,
+    values: &mut [f64],
+) {
+    let mut value = vec![0.0; width];
+    for k in 0..values.len() / width {
+        let x = |j: usize| {
+            let of_block = j.checked_sub(first).map(|j| j * width..(j + 1) * width);
+            let of_block = of_block.and_then(|range| values.get(range));
+            of_block.unwrap_or_else(|| &before[j * width..][..width])
+        };
+        equations.evaluate(first + k, x, &mut value);
+        values[k * width..][..width].copy_from_slice(&value);
+    }
 }

@@ -19,7 +19,7 @@
 //! nothing is assumed of the probability of a hit, which is larger for even sets of rays than for
 //! independent ones.
 
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::blocker_tree::BlockerTree;
 use super::convex_polygons::ConvexPolygon;
@@ -32,6 +32,7 @@ use super::shadow_rays::{rays_needed, shadowed_exchange};
 use super::shaft::fully_occludes;
 use super::visible_mean::{MIN_POINTS, visible_mean};
 use crate::sampling::hash::split_mix64;
+use crate::work;
 
 /// Minimum number of shadow rays, tried before a shaft is built; with fewer their error would be
 /// uncertain. Measured: 13 µs, where a shaft takes 8 µs.
@@ -48,18 +49,29 @@ pub(super) struct PairEstimator<'a> {
     pub known: &'a [&'a [u32]],
 }
 
+/// A pair whose exchange takes sets of rays: seconds, which all threads and processes share.
+#[derive(Serialize, Deserialize)]
+pub(super) struct PairOfSets {
+    /// The smaller polygon, and the larger one.
+    polygons: [u32; 2],
+    hits: [u32; 2],
+    density: f64,
+    tolerance: f64,
+}
+
 impl PairEstimator<'_> {
     /// A₁F₁₂ of polygons `s` and `t`, of whose rays `hits` hit the other, by halves, with a
-    /// standard error of about `tolerance`, in squares of the scene's unit.
+    /// standard error of about `tolerance`, in squares of the scene's unit; or what
+    /// [`PairEstimator::by_sets`] needs for it.
     pub fn exchange(
         &self,
         [s, t]: [u32; 2],
         hits: [u32; 2],
         tolerance: f64,
         visibility: &mut PointVisibility,
-    ) -> Estimate {
+    ) -> Result<Estimate, PairOfSets> {
         let Some(pair) = FacingPair::new(self.polygon(s), self.polygon(t)) else {
-            return Estimate::default();
+            return Ok(Estimate::default());
         };
         let unoccluded = pair.unoccluded();
         let density = self.ray_density(s) + self.ray_density(t);
@@ -68,10 +80,26 @@ impl PairEstimator<'_> {
             // 20 times.
             let hits = hits[0] + hits[1];
             let error = f64::from(hits + 1).sqrt() / density;
-            return Estimate { value: f64::from(hits) / density, error };
+            return Ok(Estimate { value: f64::from(hits) / density, error });
         }
-        let refined = self.refined([s, t], pair, unoccluded, tolerance, visibility);
-        with_missed(refined, hits, 0.5 * density)
+        match self.refined([s, t], pair, unoccluded, tolerance, visibility) {
+            Some(refined) => Ok(with_missed(refined, hits, 0.5 * density)),
+            None => {
+                let polygons = if self.is_smaller(s, t) { [s, t] } else { [t, s] };
+                Err(PairOfSets { polygons, hits, density, tolerance })
+            }
+        }
+    }
+
+    /// The same by sets of rays. All processes call it.
+    pub fn by_sets(&self, pair: &PairOfSets) -> Estimate {
+        let estimate = self.sets_of_rays(pair.polygons, pair.tolerance);
+        with_missed(estimate, pair.hits, 0.5 * pair.density)
+    }
+
+    /// Whether polygon `s` is no larger than polygon `t`.
+    fn is_smaller(&self, s: u32, t: u32) -> bool {
+        self.polygon(s).area <= self.polygon(t).area
     }
 
     /// Rays of polygon `s` over its area.
@@ -83,7 +111,8 @@ impl PairEstimator<'_> {
         &self.fronts.polygons[s as usize]
     }
 
-    /// The exchange of a pair for which counts are not accurate enough.
+    /// The exchange of a pair for which counts are not accurate enough; none if it takes sets of
+    /// rays.
     fn refined(
         &self,
         [s, t]: [u32; 2],
@@ -91,7 +120,7 @@ impl PairEstimator<'_> {
         unoccluded: Estimate,
         tolerance: f64,
         visibility: &mut PointVisibility,
-    ) -> Estimate {
+    ) -> Option<Estimate> {
         let seed = split_mix64(split_mix64(u64::from(s)) ^ u64::from(t));
         let shadow_rays = rays_needed(unoccluded.value, tolerance);
         let from_shadow_rays = |pair: &FacingPair| {
@@ -100,32 +129,33 @@ impl PairEstimator<'_> {
             shadowed_exchange(pair, unoccluded.value, rays, seed, is_hidden)
         };
         if shadow_rays <= f64::from(MIN_SHADOW_RAYS) {
-            return from_shadow_rays(&pair);
+            return Some(from_shadow_rays(&pair));
         }
         // Of more, those that rays hit are likely fewer. Plain choice, as is the number of rays.
         let Some(between) = self.blockers.few_within(&pair.shaft(), 64) else {
             return match shadow_rays <= 1000.0 {
-                true => from_shadow_rays(&pair),
+                true => Some(from_shadow_rays(&pair)),
                 false => self.past_known([s, t], pair, unoccluded, tolerance, seed, visibility),
             };
         };
         if between.is_empty() {
-            return unoccluded;
+            return Some(unoccluded);
         }
         if between.iter().any(|blocker| fully_occludes(blocker, &pair.a, &pair.b)) {
-            return Estimate::default();
+            return Some(Estimate::default());
         }
         // In shadow rays of 0.4 µs: a point's view takes some 1 µs, and 0.25 µs a blocker, from
         // measured 10 to 16 µs with 40 to 70 blockers.
         let points_cost = 2.5 + 0.6 * between.len() as f64;
         if shadow_rays <= 2.0 * f64::from(MIN_POINTS) * points_cost {
-            return from_shadow_rays(&pair);
+            return Some(from_shadow_rays(&pair));
         }
         let pair = if pair.is_better_from_a(&between) { pair } else { pair.swapped() };
-        visible_mean(&pair, &between, unoccluded.value, tolerance, seed, visibility)
+        Some(visible_mean(&pair, &between, unoccluded.value, tolerance, seed, visibility))
     }
 
-    /// The exchange from the smaller polygon with the blockers that are known around it.
+    /// The exchange from the smaller polygon with the blockers that are known around it; none if
+    /// these are many.
     fn past_known(
         &self,
         [s, t]: [u32; 2],
@@ -134,14 +164,14 @@ impl PairEstimator<'_> {
         tolerance: f64,
         seed: u64,
         visibility: &mut PointVisibility,
-    ) -> Estimate {
-        let is_first = self.polygon(s).area <= self.polygon(t).area;
+    ) -> Option<Estimate> {
+        let is_first = self.is_smaller(s, t);
         let (small, large) = if is_first { (s, t) } else { (t, s) };
         let known = self.known[small as usize];
         let between = self.blockers.of_these_within(known, &pair.shaft());
         // With more, points cost more than rays. Plain choice.
         if between.len() > 256 {
-            return self.sets_of_rays([small, large], tolerance);
+            return None;
         }
         let past_known = if between.is_empty() {
             unoccluded
@@ -154,10 +184,10 @@ impl PairEstimator<'_> {
         // If the second half of the rays hit unknown blockers, assume one more hit.
         let likely = hidden + row.unknown.min(1);
         let per_ray = 2.0 / self.ray_density(small);
-        Estimate {
+        Some(Estimate {
             value: (past_known.value - per_ray * f64::from(hidden)).max(0.0),
             error: libm::hypot(past_known.error, per_ray * f64::from(likely).sqrt()),
-        }
+        })
     }
 
     /// The exchange from sets of rays, until their means agree.
@@ -166,10 +196,9 @@ impl PairEstimator<'_> {
         let mut means: Vec<f64> = vec![];
         loop {
             let more = means.len().max(16);
-            let seeds = (means.len()..means.len() + more).map(|k| split_mix64(k as u64));
-            let seeds: Vec<u64> = seeds.collect();
-            let mean = |&seed: &u64| area * self.caster.share(s, t, 1 << 16, seed);
-            means.par_extend(seeds.par_iter().map(mean));
+            let first = means.len();
+            let seed = |k: usize| split_mix64((first + k) as u64);
+            means.extend(work::map(more, |k| area * self.caster.share(s, t, 1 << 16, seed(k))));
             let count = means.len() as f64;
             let value = means.iter().sum::<f64>() / count;
             let squares: f64 = means.iter().map(|mean| (mean - value).powi(2)).sum();

@@ -16,7 +16,7 @@ use super::matrix_rows::MatrixRows;
 use super::scene_polygons::ScenePolygons;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::scene::Scene;
-use crate::work::{Batches, agree};
+use crate::work::{Batches, agree, is_first};
 
 /// Begins every file; the last byte is the version.
 const MAGIC: &[u8; 8] = b"radipar\x02";
@@ -99,7 +99,8 @@ impl Making<'_> {
 
     /// Makes the rows of the polygons `wanted`, ascending, from `pieces` of them in that order:
     /// `work` of each piece, and `row` of all results of a polygon. `progress` turns the number of
-    /// rows done into what is reported. `None` if stopped.
+    /// rows done into what is reported. `None` if stopped. Of several processes the first has the
+    /// rows.
     pub fn rows_of_pieces<P: Sync, R: Send + Sync + Serialize + DeserializeOwned>(
         &mut self,
         wanted: &[u32],
@@ -124,7 +125,10 @@ impl Making<'_> {
             for &s in whole {
                 let own = made.iter().take_while(|(of, _)| *of == s).count();
                 let results = made.drain(..own).map(|(_, result)| result).collect();
-                self.part.rows[s as usize] = Some(row(s, results));
+                let row = row(s, results);
+                if is_first() {
+                    self.part.rows[s as usize] = Some(row);
+                }
             }
             left = rest;
             let (done, of) = progress(wanted.len() - left.len());
@@ -225,7 +229,8 @@ impl PartialMatrix {
             return Err(Error::new(ErrorKind::Setting, "parts of a matrix", found, remedy));
         }
         let areas = &self.areas;
-        let mut factors: Vec<Vec<Factor>> = areas.iter().map(|_| vec![]).collect();
+        let counts = self.most_factors();
+        let mut factors: Vec<Vec<Factor>> = counts.into_iter().map(Vec::with_capacity).collect();
         let mut back = vec![Estimate::default(); areas.len()];
         let mut rows = self.rows.into_iter().zip(&self.groups).peekable();
         for i in 0..areas.len() {
@@ -262,6 +267,19 @@ impl PartialMatrix {
         };
         let MatrixRows { names, back_of } = self.matrix_rows;
         Ok(ViewFactors { names, back_of, areas, factors, open, back, absent })
+    }
+
+    /// Factors of each row of the matrix, at most: as many where each group is one polygon.
+    fn most_factors(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.areas.len()];
+        for (row, &from) in self.rows.iter().zip(&self.groups) {
+            for exchange in row.iter().flat_map(|row| &row.fronts) {
+                counts[from as usize] += 1;
+                counts[exchange.to as usize] += usize::from(exchange.to != from);
+            }
+        }
+        // Its polygons may see the same groups.
+        counts.into_iter().map(|count| count.min(self.areas.len())).collect()
     }
 
     /// Serializes the rows, for a file or another process.

@@ -221,5 +221,6 @@ pub(super) fn sum_of_counts(a: &[Count], b: &[Count]) -> Vec<Count> {
         let of_b = b.next_if(|c| c.polygon == polygon).map_or([0; 2], |c| c.halves);
         union.push(Count { polygon, halves: [0, 1].map(|half| of_a[half] + of_b[half]) });
     }
+    union.shrink_to_fit();
     union
 }

@@ -19,7 +19,7 @@ use serde::de::DeserializeOwned;
 use super::fronts::Fronts;
 use super::known_blockers::KnownBlockers;
 use super::matrix::{Estimate, MatrixSize};
-use super::pair_estimate::PairEstimator;
+use super::pair_estimate::{PairEstimator, PairOfSets};
 use super::partial_matrix::{Exchange, Making, PolygonRow};
 use super::point_visibility::PointVisibility;
 use super::ray_rows::{Count, FirstHalf, RayCaster, RayRow, sum_of_counts};
@@ -78,15 +78,15 @@ pub(super) fn make(
     let halves: Vec<FirstHalf> = in_batches(&all, making, 0..of, |&s| caster.first_half(s, rays))?;
     let of_fronts = caster.blockers_of_fronts();
     let known = KnownBlockers::new(&fronts, &blockers, &of_fronts, &halves);
-    let rows: Vec<RayRow> = in_batches(&all, making, count..of, |&s| {
+    let mut rows: Vec<RayRow> = in_batches(&all, making, count..of, |&s| {
         caster.row(s, rays, &halves[s as usize], known.around(s as usize))
     })?;
     drop(halves);
     let known: Vec<&[u32]> = (0..count).map(|s| known.around(s)).collect();
     let (blockers, caster) = (&blockers, &caster);
+    let later = met_either_way(&mut rows);
     let (fronts, rows, known) = (&fronts, &rows, &known);
     let estimator = PairEstimator { fronts, blockers, caster, rows, known };
-    let later = met_either_way(rows);
     // The number of pairs of polygons varies by a factor of a thousand.
     let pieces_of = |&s: &u32| later[s as usize].chunks(PAIRS_OF_PIECE).map(move |c| (s, c));
     let pieces: Vec<(u32, &[Count])> = wanted.iter().flat_map(pieces_of).collect();
@@ -95,11 +95,36 @@ pub(super) fn make(
         &pieces,
         |done| ((2 * count + done) * count / of, count),
         |s, later| exchanges_of(&estimator, s, later, error),
-        |s, exchanges| PolygonRow {
-            fronts: sums_by_group(exchanges.concat()),
-            back: to_backs(fronts, &rows[s as usize], s),
+        |s, pieces| {
+            let exchanges = pieces.into_iter().flat_map(|piece| completed(&estimator, piece));
+            PolygonRow {
+                fronts: sums_by_group(exchanges.collect()),
+                back: to_backs(fronts, &rows[s as usize], s),
+            }
         },
     )
+}
+
+/// Exchanges of a polygon with others, those by sets of rays as `None`, and these in their order:
+/// with the group, and the pair.
+type Piece = (Vec<Option<Exchange>>, Vec<(u32, PairOfSets)>);
+
+/// The exchanges of a piece. All processes call it.
+fn completed(estimator: &PairEstimator, (exchanges, by_sets): Piece) -> Vec<Exchange> {
+    let mut by_sets = by_sets.into_iter();
+    let exchange = |done: Option<Exchange>| match done {
+        Some(exchange) => Some(exchange),
+        None => {
+            let (group, pair) = by_sets.next()?;
+            nonzero(group, estimator.by_sets(&pair))
+        }
+    };
+    exchanges.into_iter().filter_map(exchange).collect()
+}
+
+/// An exchange with a group, unless it is certainly zero.
+fn nonzero(group: u32, area: Estimate) -> Option<Exchange> {
+    (area.value > 0.0 || area.error > 0.0).then(|| Exchange::new(group, area))
 }
 
 /// The results of `work` for all `items`, in parallel; `None` if stopped. `told` is the range of
@@ -131,45 +156,51 @@ fn sums_by_group(exchanges: Vec<Exchange>) -> Vec<Exchange> {
         let exchanges = of_group.iter().map(Exchange::estimate);
         Exchange::new(of_group[0].to, Estimate::sum(exchanges))
     };
-    groups.map(sum).collect()
+    let mut sums: Vec<Exchange> = groups.map(sum).collect();
+    sums.shrink_to_fit();
+    sums
 }
 
 /// Per polygon the later ones that its rays have hit, or whose rays have hit it, with the sum of
-/// the rays of both.
-fn met_either_way(rows: &[RayRow]) -> Vec<Vec<Count>> {
+/// the rays of both. Takes the fronts out of `rows`.
+fn met_either_way(rows: &mut [RayRow]) -> Vec<Vec<Count>> {
     let mut met_by: Vec<Vec<Count>> = rows.iter().map(|_| vec![]).collect();
-    for (t, row) in (0..).zip(rows) {
+    for (t, row) in (0..).zip(rows.iter()) {
         for count in row.fronts.iter().take_while(|count| count.polygon < t) {
             met_by[count.polygon as usize].push(Count { polygon: t, halves: count.halves });
         }
     }
-    let union = |(s, met_by): (u32, Vec<Count>)| {
-        let own = &rows[s as usize].fronts;
+    let union = |((s, met_by), row): ((u32, Vec<Count>), &mut RayRow)| {
+        let own = std::mem::take(&mut row.fronts);
         let later = own.partition_point(|count| count.polygon <= s);
         sum_of_counts(&own[later..], &met_by)
     };
-    (0..).zip(met_by).map(union).collect()
+    (0..).zip(met_by).zip(rows).map(union).collect()
 }
 
 /// The exchanges of polygon `s` with `later` ones, each labelled with the other's group.
-fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) -> Vec<Exchange> {
+fn exchanges_of(estimator: &PairEstimator, s: u32, later: &[Count], error: f64) -> Piece {
     let fronts = estimator.fronts;
     let area_share = |s: u32| {
         let group_area = fronts.areas[fronts.group(s)];
         (fronts.polygons[s as usize].area / group_area, group_area)
     };
     let mut visibility = PointVisibility::default();
-    let mut exchanges = Vec::with_capacity(later.len());
+    let (mut exchanges, mut by_sets) = (Vec::with_capacity(later.len()), vec![]);
     for &Count { polygon: t, halves } in later {
         let ((share_s, area_s), (share_t, area_t)) = (area_share(s), area_share(t));
         // Errors of the pairs of two groups are independent: squares add up.
         let tolerance = 0.5 * error * area_s.min(area_t) * (share_s * share_t).sqrt();
-        let area = estimator.exchange([s, t], halves, tolerance, &mut visibility);
-        if area.value > 0.0 || area.error > 0.0 {
-            exchanges.push(Exchange::new(fronts.group(t) as u32, area));
+        let group = fronts.group(t) as u32;
+        match estimator.exchange([s, t], halves, tolerance, &mut visibility) {
+            Ok(area) => exchanges.extend(nonzero(group, area).map(Some)),
+            Err(pair) => {
+                exchanges.push(None);
+                by_sets.push((group, pair));
+            }
         }
     }
-    exchanges
+    (exchanges, by_sets)
 }
 
 /// The exchange of polygon `s` with backs, by counts of its rays.

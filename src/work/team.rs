@@ -208,6 +208,19 @@ impl Team {
         self.ranks.size()
     }
 
+    pub fn rank(&self) -> usize {
+        self.ranks.rank()
+    }
+
+    pub fn recorder(&mut self) -> Option<&mut Recorder> {
+        self.recorder.as_mut()
+    }
+
+    /// Whether it is known how long an item takes at this site.
+    pub fn knows(&self, site: Site) -> bool {
+        self.costs.contains_key(&site)
+    }
+
     /// Whether work is shared out, or is to be recorded as if it were.
     pub fn is_divided(&self) -> bool {
         self.processes() > 1 || self.recorder.is_some()
@@ -310,7 +323,7 @@ impl Team {
     }
 
     /// What all processes say, by rank, and the mean time that they worked.
-    fn exchange<M: Serialize + DeserializeOwned>(
+    pub fn exchange<M: Serialize + DeserializeOwned>(
         &mut self,
         busy: Duration,
         message: &M,

@@ -90,7 +90,7 @@ impl Options {
         // Before the view factors, which may take minutes.
         let rows = self.rows(&source)?;
         let surfaces = boundaries::read(&self.boundaries, &rows, bands, self.temperatures)?;
-        let mut matrix = self.matrix(source)?;
+        let Some(mut matrix) = self.matrix(source)? else { return Ok(()) };
         if self.enforce {
             matrix = enforce(&matrix);
         }
@@ -116,20 +116,19 @@ impl Options {
         Ok(Source::Scene(Box::new(self.factors.scene(path)?)))
     }
 
-    /// The view factors of `source`, with their checks printed.
-    fn matrix(&self, source: Source) -> Result<ViewFactors, Stop> {
-        match source {
-            Source::Scene(scene) => {
-                let matrix = self.factors.matrix(&scene)?;
-                print_checks(&matrix);
-                self.factors.print_backs_met(&scene, &matrix)?;
-                Ok(matrix)
-            }
-            Source::Matrix(matrix) => {
-                print_checks(&matrix);
-                Ok(matrix)
-            }
+    /// The view factors of `source`, with their checks printed, in the first process.
+    fn matrix(&self, source: Source) -> Result<Option<ViewFactors>, Stop> {
+        let (matrix, scene) = match source {
+            Source::Scene(scene) => (self.factors.matrix(&scene)?, Some(scene)),
+            Source::Matrix(matrix) => (Some(matrix), None),
+        };
+        if let Some(matrix) = &matrix {
+            print_checks(matrix);
         }
+        if let (Some(matrix), Some(scene)) = (&matrix, scene) {
+            self.factors.print_backs_met(&scene, matrix)?;
+        }
+        Ok(matrix)
     }
 
     /// The rows of the matrix that `source` gives.

@@ -161,7 +161,7 @@ impl Options {
             return self.to_error.write_rows(&scene, rows.clone(), &stem);
         }
         let start = Instant::now();
-        let mut matrix = self.to_error.matrix(&scene)?;
+        let Some(mut matrix) = self.to_error.matrix(&scene)? else { return Ok(()) };
         let seconds = start.elapsed().as_secs_f64();
         let nonzeros: usize = matrix.factors.iter().map(Vec::len).sum();
         say!("{}: {groups} groups, {nonzeros} nonzeros, {seconds:.3} s", path.display());

@@ -27,10 +27,11 @@ pub fn memory(text: &str) -> Parsed<f64> {
 }
 
 impl ToError {
-    /// The whole matrix.
-    pub fn matrix(&self, scene: &Scene) -> Result<ViewFactors, Stop> {
+    /// The whole matrix, in the first process.
+    pub fn matrix(&self, scene: &Scene) -> Result<Option<ViewFactors>, Stop> {
         let all = 0..self.matrix_rows(scene)?.names.len();
-        Ok(self.rows(scene, all)?.into_matrix()?)
+        let rows = self.rows(scene, all)?;
+        Ok(if is_first() { Some(rows.into_matrix()?) } else { None })
     }
 
     /// Makes `rows` and writes them, beside others with this `stem`.
