@@ -1,5 +1,5 @@
 //! Long work on many items: in batches with progress between them, shared with other processes,
-//! kept in a journal.
+//! kept in a journal, its costs recorded.
 //!
 //! ```text
 //!                        ┌ in the journal ──────────────────────────────────┐
@@ -13,6 +13,16 @@
 //! every process runs the same program, and makes the same calls in the same order. What could make
 //! them differ is agreed upon: the ends of batches, the clock, and whether to go on
 //! ([`agree`]).
+//!
+//! ```text
+//! Batches          a list with progress     parts on demand; results exchanged after each batch
+//! map              a list without           the same; one batch
+//! map_blocks       a list by its data       each process has the data of its own blocks
+//! with_costs ─► Costs ─► simulate           the time that a run would take on more processes
+//! ```
+//!
+//! What is made when it is first asked for ([`std::sync::OnceLock`]) contains none of these: a
+//! process may ask earlier than another.
 //!
 //! Processes and a journal belong to the thread that runs the program, as the thread pool of rayon
 //! does: [`with_ranks`], [`with_journal`]. Functions in between know nothing of them.

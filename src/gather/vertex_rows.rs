@@ -62,7 +62,8 @@ impl<'a> VertexRows<'a> {
     }
 
     /// The results of `work` for the row of each of `vertices`, in their order, by `parts` of the
-    /// rays; what this process is to `keep` of them, each batch after it was made; none if `progress`, called after each batch with the number done, breaks.
+    /// rays; what this process is to `keep` of them, each batch after it was made; none if
+    /// `progress`, called after each batch with the number done, breaks.
     pub fn map<T: Send + Sync + Serialize + DeserializeOwned>(
         &self,
         vertices: &[u32],

@@ -16,7 +16,8 @@ pub trait Ranks: fmt::Debug {
     /// Sends `bytes` to all processes; returns the bytes of all of them, by rank.
     fn all_gather(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;
 
-    /// Asks for a number that [`Ranks::take`] is to give, so that it comes while this process works.
+    /// Asks for a number that [`Ranks::take`] is to give, so that it comes while this process
+    /// works.
     fn ask(&mut self, round: u64) {
         _ = round;
     }

@@ -206,7 +206,7 @@ impl Run<'_> {
         if self.processes == 1 {
             return;
         }
-        let messages = 2.0 * (self.processes as f64).log2().ceil();
+        let messages = 2.0 * f64::from(self.processes.next_power_of_two().trailing_zeros());
         let others = 1.0 - 1.0 / self.processes as f64;
         let transfer = bytes * others / self.cluster.bandwidth;
         self.time.exchange += (messages * self.cluster.latency + transfer) * SECOND;

@@ -383,6 +383,8 @@ pub(super) fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::Range;
+
     use super::parts;
 
     #[test]
@@ -400,7 +402,7 @@ mod tests {
     fn short_work_is_divided_evenly() {
         let sizes = |cost| {
             let parts = parts(1000, 4, 1, Some(cost));
-            parts.iter().map(|part| part.len()).collect::<Vec<_>>()
+            parts.iter().map(Range::len).collect::<Vec<usize>>()
         };
         // Four milliseconds, and less; of a second the last parts take a millisecond.
         assert_eq!([sizes(4e-6), sizes(0.0)], [[250; 4], [250; 4]]);
