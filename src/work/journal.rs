@@ -14,7 +14,7 @@
 //! written when the program was killed is cut off.
 
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -62,8 +62,8 @@ impl Journal {
     /// The journal at `path` of work that depends on `parts`: that which is there, or a new one.
     ///
     /// # Errors
-    /// [`ErrorKind::File`] when the file cannot be read or written, is none of these, or is of
-    /// other parts, which it names.
+    /// [`ErrorKind::File`] when the file cannot be read or written, is none of these, is of other
+    /// parts, which it names, or is in use by another program.
     pub fn open(path: impl AsRef<Path>, parts: &[JournalPart]) -> Result<Journal, Error> {
         let path = path.as_ref();
         let failed = |error: io::Error| file_error(path, &error);
@@ -74,6 +74,12 @@ impl Journal {
             .truncate(false)
             .open(path)
             .map_err(failed)?;
+        // File systems without locks have none to refuse.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            let remedy = "wait until that has ended, or give the name of another file";
+            let found = "in use by another run";
+            return Err(Error::new(ErrorKind::File, path.display().to_string(), found, remedy));
+        }
         let mut records = HashMap::new();
         let mut reader = Reader { input: io::BufReader::new(&mut file), at: 0 };
         let mut magic = [0; MAGIC.len()];

@@ -52,6 +52,19 @@ fn bake_goes_on_from_any_byte_of_its_journal_to_the_same_bits() {
 }
 
 #[test]
+fn journal_is_of_one_run_at_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bake.state");
+    let journal = open(&path).unwrap();
+    let error = open(&path).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::File);
+    let said = error.to_string();
+    assert!(said.contains("bake.state") && said.contains("another run"), "{said}");
+    journal.finish().unwrap();
+    open(&path).unwrap();
+}
+
+#[test]
 fn journal_of_one_process_serves_several() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bake.state");
