@@ -129,3 +129,34 @@ impl Recorder {
 fn nanoseconds(duration: Duration) -> u64 {
     duration.as_nanos() as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_item_is_recorded_once() {
+        let mut recorder = Recorder::new();
+        for (count, least) in [(1000, 1), (5, 8), (100, 7)] {
+            let batch = Batch { least, remaining: count, ..Batch::default() };
+            let work = &mut |part: std::ops::Range<usize>| Ok::<_, ()>(part.collect());
+            let results: Vec<usize> = recorder.batch(batch, count as usize, work).unwrap();
+            assert!(results.into_iter().eq(0..count as usize));
+            let Some(Event::Shared(batch)) = recorder.costs.events.last() else { unreachable!() };
+            assert_eq!(batch.tasks.iter().map(|(items, _)| items).sum::<u64>(), count);
+            // Whatever follows is work of its own; all tasks but the last have as many at least.
+            let whole = &batch.tasks[..batch.tasks.len() - 1];
+            assert!(whole.iter().all(|(items, _)| *items >= least));
+            assert!(batch.bytes >= count);
+        }
+        recorder.exchange(12);
+        let costs = recorder.finish();
+        let kinds = costs.events.iter().map(|event| match event {
+            Event::Own(_) => 'o',
+            Event::Exchange(12) => 'e',
+            Event::Exchange(_) => '?',
+            Event::Shared(_) => 's',
+        });
+        assert_eq!(kinds.collect::<String>(), "osososoeo");
+    }
+}
