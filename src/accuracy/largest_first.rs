@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
-/// One of as many items is in the first part that is sorted; each further part has as many as all
-/// before. Plain choice.
+/// One of as many items is in the first part that is sorted; each further part is twice as large as
+/// the one before. Plain choice.
 const FIRST_PART: usize = 32;
 
 /// `items` in `order`, sorted as far as they are taken: n items of which k are taken cost

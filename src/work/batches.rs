@@ -17,9 +17,6 @@ use crate::progress::Instant;
 const BATCH_DURATION: Duration = Duration::from_millis(250);
 const SHARED_BATCH_DURATION: Duration = Duration::from_secs(1);
 
-/// Items of a part of [`map`], at least, where it is not known how long they take. Plain choice.
-const ITEMS_OF_PART: usize = 64;
-
 /// Splits lists of like items into batches of similar duration, and has their results computed:
 /// here, by other processes, or in an earlier run. Results must not depend on batch ends, which
 /// follow the clock.
@@ -39,7 +36,7 @@ pub(crate) struct Batches {
 
 /// What cannot go wrong.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) enum Never {}
+enum Never {}
 
 impl Batches {
     /// The first batch has `first` items.
@@ -173,11 +170,8 @@ pub(crate) fn map<R: Send + Serialize + DeserializeOwned>(
             let work = &mut |part: Range<usize>| -> Result<Vec<R>, Never> {
                 Ok(part.into_par_iter().map(&work).collect())
             };
-            let site = Location::caller();
-            let is_new = team.processes() > 1 && !team.knows(site);
-            let least = if is_new { (ITEMS_OF_PART * team.processes()) as u64 } else { 1 };
-            let batch = Batch { least, remaining: count as u64, ..Batch::default() };
-            let Ok((results, _)) = team.share_out(site, batch, count, work);
+            let batch = Batch { least: 1, remaining: count as u64, ..Batch::default() };
+            let Ok((results, _)) = team.share_out(Location::caller(), batch, count, work);
             results
         }
         _ => (0..count).into_par_iter().map(&work).collect(),

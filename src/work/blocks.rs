@@ -1,13 +1,10 @@
 //! Data that each process has a part of for good: blocks, dealt out in turn.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::batches::Never;
-use super::costs::Batch;
+use super::batches::map;
 use super::team;
 use crate::progress::Instant;
 
@@ -18,22 +15,15 @@ pub(crate) fn is_own(k: usize) -> bool {
 
 /// The results of `work` for the numbers below `count`, in their order, each by the process that
 /// keeps the data of that block.
+#[track_caller]
 pub(crate) fn map_blocks<R: Send + Serialize + DeserializeOwned>(
     count: usize,
     work: impl Fn(usize) -> R + Sync,
 ) -> Vec<R> {
-    let Some(mut team) = team::borrow().filter(|team| team.is_divided()) else {
-        return (0..count).into_par_iter().map(&work).collect();
+    let Some(mut team) = team::borrow().filter(|team| team.processes() > 1) else {
+        return map(count, work);
     };
     let processes = team.processes();
-    if let Some(recorder) = team.recorder() {
-        let batch = Batch { least: 1, remaining: count as u64, ..Batch::default() };
-        let work = &mut |part: Range<usize>| -> Result<Vec<R>, Never> {
-            Ok(part.into_par_iter().map(&work).collect())
-        };
-        let Ok(results) = recorder.batch(batch, count, work);
-        return results;
-    }
     let start = Instant::now();
     let own: Vec<usize> = (team.rank()..count).step_by(processes).collect();
     let own: Vec<R> = own.into_par_iter().map(&work).collect();

@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::team::bytes_of;
+use super::ranks::bytes_of;
 use crate::progress::Instant;
 
 /// Tasks are timed together until they take as long: reading the clock costs a thousandth of that,

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 /// One of several processes that run the same program on the same input, and exchange results.
 ///
 /// Every process makes the same calls in the same order, but for the number of calls of
@@ -53,4 +55,9 @@ impl Ranks for Alone {
         self.round = round;
         self.taken
     }
+}
+
+/// What goes from one process to another.
+pub(super) fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
+    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
 }

@@ -216,9 +216,10 @@ impl Run<'_> {
         let count = (list.count() as f64 * self.times) as usize;
         let per_item = self.times / count.max(1) as f64;
         let mut size = match list.first.of {
-            Some(number) => *self.sizes.entry(number).or_insert(list.first.size as usize),
+            Some(number) => *self.sizes.entry(number).or_insert((list.first.size as usize).max(1)),
             None => count,
         };
+        let least = (list.first.least as usize).max(1);
         let mut done = 0;
         while done < count {
             let batch = match list.first.of {
@@ -242,7 +243,7 @@ impl Run<'_> {
             }
             self.own(list.own * batch as f64 / count as f64);
             let busy = std::time::Duration::from_nanos(busy as u64);
-            size = adapted(size, list.first.least as usize, busy, self.processes, batch);
+            size = adapted(size, least, busy, self.processes, batch);
             done += batch;
         }
         if let Some(number) = list.first.of {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::costs::{Batch, Costs, Recorder};
 use super::journal::Journal;
-use super::ranks::{Alone, Ranks};
+use super::ranks::{Alone, Ranks, bytes_of};
 use crate::progress::Instant;
 
 thread_local! {
@@ -212,15 +212,6 @@ impl Team {
         self.ranks.rank()
     }
 
-    pub fn recorder(&mut self) -> Option<&mut Recorder> {
-        self.recorder.as_mut()
-    }
-
-    /// Whether it is known how long an item takes at this site.
-    pub fn knows(&self, site: Site) -> bool {
-        self.costs.contains_key(&site)
-    }
-
     /// Whether work is shared out, or is to be recorded as if it were.
     pub fn is_divided(&self) -> bool {
         self.processes() > 1 || self.recorder.is_some()
@@ -375,10 +366,6 @@ pub(super) fn parts(
         start += part;
     }
     parts
-}
-
-pub(super) fn bytes_of<M: Serialize + ?Sized>(message: &M) -> Vec<u8> {
-    postcard::to_extend(message, vec![]).expect("a vector takes all bytes")
 }
 
 #[cfg(test)]

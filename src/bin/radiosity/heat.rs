@@ -124,9 +124,9 @@ impl Options {
         };
         if let Some(matrix) = &matrix {
             print_checks(matrix);
-        }
-        if let (Some(matrix), Some(scene)) = (&matrix, scene) {
-            self.factors.print_backs_met(&scene, matrix)?;
+            if let Some(scene) = scene {
+                self.factors.print_backs_met(&scene, matrix)?;
+            }
         }
         Ok(matrix)
     }
