@@ -593,31 +593,28 @@ fn bulk_above(shares: Vec<Share>, allowed: f64, tail: f64) -> Vec<(f64, usize)> 
         (share.area, if is_known { share.square / share.area } else { 0.0 })
     };
     let errors: Vec<(f64, f64)> = shares.iter().map(error).collect();
-    let counted = |(share, kept): (&Share, f64)| match share.square.is_finite() {
-        true => kept * share.square,
-        false => 0.0,
-    };
     let kept = trimmed(&errors, tail).kept;
-    let total: f64 = shares.iter().zip(kept.iter().copied()).map(counted).sum();
-    let mut split: Vec<(Share, f64)> = shares.into_iter().zip(kept).collect();
-    split.retain(|(share, _)| share.square > 0.0);
+    // What counts of each: nothing of what is unknown.
+    let counted = |(share, kept): (Share, f64)| match share.square.is_finite() {
+        true => (share, kept * share.square),
+        false => (share, 0.0),
+    };
+    let mut shares: Vec<(Share, f64)> = shares.into_iter().zip(kept).map(counted).collect();
+    let total: f64 = shares.iter().map(|(_, counted)| counted).sum();
+    shares.retain(|(share, _)| share.square > 0.0);
     let order = |(a, _): &(Share, f64), (b, _): &(Share, f64)| {
         b.square.total_cmp(&a.square).then(a.element.cmp(&b.element))
     };
     // Dörfler (1996): 80 % of the error is split at a time, since the next gather may change the
     // rest.
     let (mut excess, mut bulk) = (total - allowed * (1.0 - tail) * area, 0.8 * total);
-    let is_marked = move |(share, kept): &(Share, f64)| {
-        if share.square.is_finite() {
-            if excess <= 0.0 || bulk <= 0.0 {
-                return false;
-            }
-            excess -= LOST_BY_SPLIT * counted((share, *kept));
-            bulk -= counted((share, *kept));
-        }
-        true
+    let is_marked = move |(share, counted): &(Share, f64)| {
+        let is_marked = !share.square.is_finite() || (excess > 0.0 && bulk > 0.0);
+        excess -= LOST_BY_SPLIT * counted;
+        bulk -= counted;
+        is_marked
     };
-    let marked = in_order(split, order).take_while(is_marked);
+    let marked = in_order(shares, order).take_while(is_marked);
     marked.map(|(share, _)| (share.square / area, share.element)).collect()
 }
 
