@@ -13,6 +13,8 @@ mod light;
 mod light_map;
 mod luminaires;
 mod output;
+#[cfg(unix)]
+mod preview;
 mod scaling;
 mod sky;
 mod trade_off;

@@ -2,6 +2,7 @@
 
 pub mod bands;
 pub mod files;
+pub mod preview;
 pub mod settings;
 
 use std::cell::Cell;
@@ -69,6 +70,9 @@ pub struct Bake {
     /// exists: the files are those of a bake that was not interrupted; not with --time
     #[arg(long, value_name = "FILE", hide = true)]
     state: Option<PathBuf>,
+    /// Write STEM.ply and .glb again whenever the light is better, while the bake goes on
+    #[arg(long, hide = true, conflicts_with = "keep_mesh")]
+    preview: bool,
     #[command(flatten)]
     files: Files,
     #[command(flatten)]
@@ -148,6 +152,9 @@ impl Bake {
     fn bake_file(mut self, path: &Path) -> Result<Report, Stop> {
         let start = Instant::now();
         self.files.name_after(path, &self.reading, self.keep_mesh)?;
+        if self.preview {
+            self.files.check_preview()?;
+        }
         let Input { scene, luminaires, mut warnings, .. } = self.reading.read(path)?;
         let bands = self.bands.as_ref().map(|path| bands::read_and_warn(path, &scene));
         let bands = bands.transpose()?;
@@ -161,8 +168,14 @@ impl Bake {
         let light = with_journal(&mut state, || {
             // Otherwise the bake drops the scene once it is cut.
             let kept = self.keep_mesh.then(|| scene.clone());
-            let mut baked = progress::of_bake(|unshot_goal, report| {
-                self.bake(scene, &device, start, unshot_goal, report)
+            let previewed = Some(&self.files).filter(|_| self.preview && is_first());
+            let mut baked = preview::during(previewed, |preview| {
+                progress::of_bake(|unshot_goal, report| {
+                    self.bake(scene, &device, start, unshot_goal, &mut |progress| {
+                        preview(progress);
+                        report(progress)
+                    })
+                })
             })?;
             if let Some(scene) = kept {
                 baked = self.on_kept_mesh(&baked, scene, &device)?;

@@ -3,7 +3,7 @@
 use clap::Args;
 use radiosity::camera::RadianceImage;
 use radiosity::io::{GlbSettings, ToneCurve};
-use radiosity::{BakeResult, Error, ErrorKind};
+use radiosity::{Error, ErrorKind, GatheredMesh};
 
 use crate::args::value;
 
@@ -39,21 +39,21 @@ impl ViewerOptions {
     }
 
     /// The curve of radiosity for meshes: that of a picture of them, unless it is black.
-    pub fn of_meshes(&self, image: Option<&RadianceImage>, baked: &BakeResult) -> ToneCurve {
+    pub fn of_meshes(&self, image: Option<&RadianceImage>, light: &GatheredMesh) -> ToneCurve {
         let image = image.filter(|image| self.exposure.is_some() || is_lit(image));
         match image.map(|image| self.of_picture(image)).or_else(|| self.given()) {
             Some(tone) => tone.of_radiosity(),
-            None => ToneCurve::fit(&baked.light.surface.radiosity),
+            None => ToneCurve::fit(&light.surface.radiosity),
         }
     }
 }
 
-/// Settings of a GLB file of `baked`, whose unit of length is `metres`, in the colours of `tone`, a
-/// curve of radiosity.
-pub fn glb_settings(tone: &ToneCurve, metres: f64, baked: &BakeResult) -> GlbSettings {
+/// Settings of a GLB file of light with this `error`, a share, whose unit of length is `metres`, in
+/// the colours of `tone`, a curve of radiosity.
+pub fn glb_settings(tone: &ToneCurve, metres: f64, error: f64) -> GlbSettings {
     let mut settings = GlbSettings::from(tone);
     settings.metres = metres;
-    settings.error = baked.estimate.total;
+    settings.error = error;
     settings
 }
 

@@ -161,7 +161,7 @@ impl Files {
             image = Some(seen);
         }
         // Where the picture is black, what it does not show has its own exposure.
-        let tone = self.viewer.of_meshes(image.as_ref(), baked);
+        let tone = self.viewer.of_meshes(image.as_ref(), &baked.light);
         self.write_meshes(baked, &tone);
         Ok(picture)
     }
@@ -190,7 +190,7 @@ impl Files {
             }
         }
         if self.writes(Format::Glb) {
-            self.write_glb(baked, &glb_settings(tone, self.metres, baked));
+            self.write_glb(baked, &glb_settings(tone, self.metres, baked.estimate.total));
         }
         if self.elements {
             progress::of_writing(&self.output.path("elements.ply"), |path| {
@@ -215,19 +215,35 @@ impl Files {
         surface
     }
 
-    /// Writes the glTF file of the scene with its light, or the mesh of the light.
+    /// The file for viewers of glTF.
+    fn glb_path(&self) -> PathBuf {
+        self.output.path(self.lit_source().map_or("glb", |source| source.ending))
+    }
+
+    /// The glTF file that is written again with light; none if the mesh of the light is.
+    fn lit_source(&self) -> Option<&Source> {
+        self.source.as_ref().filter(|_| !self.refine)
+    }
+
+    /// Writes the glTF file of the scene with its `light`, or the mesh of the light, to this path.
+    fn write_glb_to(
+        &self,
+        to: &Path,
+        light: &GatheredMesh,
+        settings: GlbSettings,
+    ) -> Result<LitVertices, Error> {
+        match self.lit_source() {
+            Some(Source { path, scene, .. }) => {
+                write_lit_gltf(to, standard::input(path)?, light, scene.as_deref(), settings)
+            }
+            None => write_glb(to, light, settings).map(|()| LitVertices::default()),
+        }
+    }
+
+    /// The same to its path, and says what has no light.
     fn write_glb(&self, baked: &BakeResult, settings: &GlbSettings) {
-        let Some(source) = self.source.as_ref().filter(|_| !self.refine) else {
-            let write = |path: &Path| write_glb(path, &baked.light, settings.clone());
-            progress::of_writing(&self.output.path("glb"), write);
-            return;
-        };
-        let Source { path, ending, scene } = source;
-        let write = |to: &Path| {
-            let source = standard::input(path)?;
-            write_lit_gltf(to, source, &baked.light, scene.as_deref(), settings.clone())
-        };
-        let Some(counts) = progress::of_writing(&self.output.path(ending), write) else { return };
+        let write = |to: &Path| self.write_glb_to(to, &baked.light, settings.clone());
+        let Some(counts) = progress::of_writing(&self.glb_path(), write) else { return };
         let LitVertices { without, instances, .. } = counts;
         if without > 0 {
             eprintln!("warning: {without} vertices are of no lit triangle: black in the glTF file");
@@ -238,6 +254,40 @@ impl Files {
                  glTF file: --refine writes a mesh for each"
             );
         }
+    }
+
+    /// Checks that there are files to be written while a bake is under way.
+    pub fn check_preview(&self) -> Result<(), Error> {
+        let writes_mesh = self.writes(Format::Ply) || self.writes(Format::Glb);
+        if writes_mesh && !self.output.is_dash() {
+            return Ok(());
+        }
+        let (found, remedy) = ("without a file to write", "add ply or glb to --write");
+        Err(Error::new(ErrorKind::Setting, "--preview", found, remedy))
+    }
+
+    /// Writes meshes of the `light` of a bake that is under way, with its estimated error, if that
+    /// is known.
+    pub fn write_preview(
+        &self,
+        light: &GatheredMesh,
+        estimate: Option<&ErrorEstimate>,
+    ) -> Result<(), Error> {
+        let tone = self.viewer.of_meshes(None, light);
+        if self.writes(Format::Ply) {
+            let mut surface = light.surface.clone();
+            surface.comments = vec![match estimate {
+                Some(estimate) => error_comment(estimate, "preview"),
+                None => "preview, its error is not known yet".into(),
+            }];
+            write_ply_with_tone(&self.output.path("ply"), &surface, &tone)?;
+        }
+        if self.writes(Format::Glb) {
+            let error = estimate.map_or(0.0, |estimate| estimate.total);
+            let settings = glb_settings(&tone, self.metres, error);
+            self.write_glb_to(&self.glb_path(), light, settings)?;
+        }
+        Ok(())
     }
 
     /// Writes the light of bands and, if they have colours, a picture of these: from the camera of
@@ -323,12 +373,16 @@ fn comments(baked: &BakeResult) -> Vec<String> {
     if baked.settings.solve.ambient {
         comments.push("ambient term of the unshot light added to the elements".into());
     }
-    let ErrorEstimate { total, samples, .. } = baked.estimate;
-    comments.push(format!(
-        "{ESTIMATED_ERROR}{:.3} % of reflected radiosity, RMS over area, at {samples} places \
-         ({}); vertices have their own",
-        100.0 * total,
-        baked.outcome
-    ));
+    let outcome = format!("{}; vertices have their own", baked.outcome);
+    comments.push(error_comment(&baked.estimate, &outcome));
     comments
+}
+
+/// The `comment` that tells an error, with a remark.
+fn error_comment(estimate: &ErrorEstimate, remark: &str) -> String {
+    format!(
+        "{ESTIMATED_ERROR}{:.3} % of reflected radiosity, RMS over area, at {} places ({remark})",
+        100.0 * estimate.total,
+        estimate.samples
+    )
 }

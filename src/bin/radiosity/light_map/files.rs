@@ -147,7 +147,7 @@ impl Options {
         }
         let tone = self.tone(baked)?;
         if writes(Format::Glb) {
-            let settings = glb_settings(&tone, self.reading.unit, baked);
+            let settings = glb_settings(&tone, self.reading.unit, baked.estimate.total);
             match self.binding()? {
                 Some((ending, binding)) => {
                     self.write_mapped(map, &path(ending), binding, &settings)?;
@@ -266,6 +266,6 @@ impl Options {
         let image = progress::of_count("pixels of the picture", |report| {
             camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
         })?;
-        Ok(self.viewer.of_meshes(image.as_ref(), baked))
+        Ok(self.viewer.of_meshes(image.as_ref(), &baked.light))
     }
 }
