@@ -258,7 +258,7 @@ impl Bake {
         device: &Backend,
     ) -> Result<BakeResult, Stop> {
         let error = self.error.unwrap_or(0.05);
-        let kept = progress::of_stoppable("vertices, then paths", |report| {
+        let kept = progress::of_count("vertices, then paths", |report| {
             baked.on_kept_mesh(scene, error, device, report)
         })?;
         kept.ok_or(Stop::Interrupted)

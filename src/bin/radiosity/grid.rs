@@ -171,7 +171,7 @@ impl Options {
     fn measure(&self, grids: &[Placed], light: &Light) -> Result<Option<Vec<MeasuredGrid>>, Error> {
         let (lit, grids) = (&light.baked.light, grids.iter().map(|(_, grid)| grid.clone()));
         let grids: Vec<MeasuringGrid> = grids.collect();
-        progress::of_stoppable("points", |report| {
+        progress::of_count("points", |report| {
             let mut gatherers = |noise| light.device.gather_to_noise(lit, noise);
             MeasuringGrid::measure_to(&grids, lit, &mut gatherers, self.light.error(), report)
         })
@@ -181,7 +181,7 @@ impl Options {
     /// where Ctrl-C stopped it.
     fn correct(&self, measured: &mut [MeasuredGrid], light: &Light) -> Result<Option<bool>, Error> {
         let lit = &light.baked.light;
-        progress::of_stoppable("paths", |report| {
+        progress::of_count("paths", |report| {
             let mut is_reached = true;
             for grid in measured.iter_mut() {
                 let Some(correction) = grid.correct(lit, self.light.error(), &mut *report)? else {

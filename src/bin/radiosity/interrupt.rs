@@ -11,22 +11,26 @@
 //! first progress report: before that there is nothing to write.
 
 use std::ops::ControlFlow;
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Once, OnceLock};
+use std::time::{Duration, Instant};
 
 use radiosity::work::agree;
 
 /// Exit status of a program that was interrupted: 128 + SIGINT, as shells have it.
 pub const EXIT_STATUS: u8 = 130;
 
-static STOPPED: AtomicBool = AtomicBool::new(false);
+/// How long results are made after Ctrl-C: half of the two seconds in which the program is to end.
+const TIME_FOR_RESULTS: Duration = Duration::from_secs(1);
+
+/// When the program was asked to end.
+static STOPPED: OnceLock<Instant> = OnceLock::new();
 
 /// From here on the first Ctrl-C, SIGTERM or SIGHUP stops the work.
 pub fn catch() {
     static CAUGHT: Once = Once::new();
     CAUGHT.call_once(|| {
         let caught = ctrlc::set_handler(|| {
-            if STOPPED.swap(true, Ordering::Relaxed) {
+            if STOPPED.set(Instant::now()).is_err() {
                 std::process::exit(EXIT_STATUS.into());
             }
             eprintln!("stopping, to write what there is; Ctrl-C again ends at once");
@@ -44,5 +48,17 @@ pub fn stopped() -> bool {
 
 /// What progress callbacks answer: break after Ctrl-C.
 pub fn flow() -> ControlFlow<()> {
-    if STOPPED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    flow_after(Duration::ZERO)
+}
+
+/// The same of what results are made by: break a second after Ctrl-C.
+pub fn flow_of_results() -> ControlFlow<()> {
+    flow_after(TIME_FOR_RESULTS)
+}
+
+fn flow_after(time: Duration) -> ControlFlow<()> {
+    match STOPPED.get().is_some_and(|stopped| stopped.elapsed() >= time) {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    }
 }

@@ -137,7 +137,7 @@ impl Shown {
 fn gather(atlas: Atlas, baked: &BakeResult, device: &Backend) -> Result<LightMap, Stop> {
     args::end()?;
     let map =
-        progress::of_stoppable("texels", |report| LightMap::of_bake(atlas, baked, device, report))?;
+        progress::of_count("texels", |report| LightMap::of_bake(atlas, baked, device, report))?;
     map.ok_or(Stop::Interrupted)
 }
 
@@ -271,7 +271,7 @@ impl Options {
             return Ok(None);
         }
         args::end()?;
-        let changes = progress::of_stoppable("texels with tilted normals", |report| {
+        let changes = progress::of_count("texels with tilted normals", |report| {
             map.directional(baked, device, report)
         })?;
         changes.map(Some).ok_or(Stop::Interrupted)
@@ -292,7 +292,7 @@ impl Options {
         let left = (self.error().powi(2) - between.value.powi(2)).max(0.0).sqrt();
         let left = left.max(0.25 * self.error().max(between.value));
         let of_light = match args::end() {
-            Ok(()) => progress::of_stoppable("paths", |report| map.correct(baked, left, report))?,
+            Ok(()) => progress::of_count("paths", |report| map.correct(baked, left, report))?,
             Err(_) => None,
         };
         let of_light = of_light.unwrap_or_else(|| baked.estimate.of_light());
@@ -343,7 +343,7 @@ impl Options {
         device: &Backend,
     ) -> Result<Option<Estimate>, Stop> {
         args::end()?;
-        let shown = progress::of_stoppable("points to measure the map", |report| {
+        let shown = progress::of_count("points to measure the map", |report| {
             map.shown_error(baked, device, report)
         })?;
         args::end()?;

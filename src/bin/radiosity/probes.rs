@@ -59,7 +59,7 @@ impl Options {
         let light = self.light.bake(scene)?;
         let mut probes = self.gather(&grid, &light)?.ok_or(Stop::Interrupted)?;
         let (lit, size, error) = (&light.baked.light, grid.size(), self.light.error());
-        let correction = progress::of_stoppable("paths", |report| {
+        let correction = progress::of_count("paths", |report| {
             correct_probes(lit, &mut probes, size, error, report)
         })?;
         let is_reached = correction.ok_or(Stop::Interrupted)?.is_reached;
@@ -85,7 +85,7 @@ impl Options {
     fn gather(&self, grid: &ProbeGrid, light: &Light) -> Result<Option<Vec<Probe>>, Error> {
         let lit = &light.baked.light;
         let mut gatherer = light.device.gather_to_noise(lit, self.light.error())?;
-        progress::of_stoppable("probes", |report| {
+        progress::of_count("probes", |report| {
             probes_at(lit, &grid.positions(), grid.size(), &mut *gatherer, report)
         })
     }

@@ -59,22 +59,27 @@ pub fn of_bake<T>(work: impl FnOnce(&Cell<f64>, OfBake) -> T) -> T {
     })
 }
 
-/// Runs `work` with the progress shown of what is counted: `unit` done, of how many.
+/// Runs `work` with the progress shown of what is counted: `unit` done, of how many. Ctrl-C stops
+/// it.
 pub fn of_count<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
+    counted(unit, work, interrupt::flow)
+}
+
+/// The same where `unit` is that of a result of what Ctrl-C stopped: for as long as the program may
+/// go on after that.
+pub fn of_result<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
+    counted(unit, work, interrupt::flow_of_results)
+}
+
+fn counted<T>(
+    unit: &str,
+    work: impl FnOnce(OfCount) -> T,
+    flow: impl Fn() -> ControlFlow<()>,
+) -> T {
     let mut display = Display::new(unit);
     work(&mut |done, of| {
         display.show(unit, share(done, of), &format!("{done} of {of} {unit}"));
-        ControlFlow::Continue(())
-    })
-}
-
-/// The same, and stops it on Ctrl-C.
-pub fn of_stoppable<T>(unit: &str, work: impl FnOnce(OfCount) -> T) -> T {
-    of_count(unit, |report| {
-        work(&mut |done, of| {
-            report(done, of)?;
-            interrupt::flow()
-        })
+        flow()
     })
 }
 

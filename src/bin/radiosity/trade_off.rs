@@ -149,7 +149,7 @@ impl Bench {
             let baked = self.bake(&name, &run.target)?;
             let surface = &baked.light.surface;
             let found = match k {
-                0 => progress::of_stoppable("points", |report| {
+                0 => progress::of_count("points", |report| {
                     verifier.measure(surface, |progress| report(progress.done, progress.of))
                 }),
                 _ => verifier.measure_at_same_points(surface),

@@ -49,8 +49,7 @@ impl Options {
         let mut rows = vec![];
         for (k, &[eye, direction]) in (1..).zip(&self.observers) {
             let observer = Observer { eye, direction, up: scene.up() };
-            let glare =
-                progress::of_stoppable("paths", |report| Glare::of(&scene, &observer, report))?;
+            let glare = progress::of_count("paths", |report| Glare::of(&scene, &observer, report))?;
             let glare = glare.ok_or(Stop::Interrupted)?;
             say!("observer {k}: {}", summary(&glare));
             warnings(k, &glare);

@@ -123,7 +123,7 @@ impl Options {
         claimed.check_sky(scene, self.reading.sky.words(scene), ply)?;
         claimed.check_luminaires(&luminaires.report(), ply)?;
         interrupt::catch();
-        let found = progress::of_stoppable("points", |report| {
+        let found = progress::of_count("points", |report| {
             verify(scene, &solution, &self.settings(), |progress| {
                 report(progress.done, progress.of)
             })

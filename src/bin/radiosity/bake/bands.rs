@@ -206,7 +206,7 @@ pub fn read_and_warn(path: &Path, scene: &Scene) -> Result<Bands, Error> {
 /// The light of `bands`, if there are any; none where Ctrl-C stopped it.
 pub fn light(bands: Option<&Bands>, baked: &BakeResult) -> Result<Option<BandLight>, Error> {
     let Some(bands) = bands.filter(|_| !interrupt::stopped()) else { return Ok(None) };
-    progress::of_stoppable("rows of vertices, for all bands", |report| bands.light(baked, report))
+    progress::of_count("rows of vertices, for all bands", |report| bands.light(baked, report))
 }
 
 /// A line a vertex: its position, then radiosity, irradiance and error by band.

@@ -150,15 +150,18 @@ impl Files {
         let mut image = None;
         if self.writes(Format::Exr) || self.writes(Format::Png) {
             let camera = self.camera.of(&baked.light, self.image);
-            let seen = self.picture(&camera, baked, device)?;
-            let any_lit = || baked.light.surface.radiosity.iter().any(|b| b.max_element() > 0.0);
-            if !is_lit(&seen) && any_lit() {
-                eprintln!("warning: the picture is black, nothing lit is in view: try --camera");
+            image = self.picture(&camera, baked, device)?;
+            if let Some(seen) = &image {
+                let radiosity = &baked.light.surface.radiosity;
+                if !is_lit(seen) && radiosity.iter().any(|b| b.max_element() > 0.0) {
+                    eprintln!(
+                        "warning: the picture is black, nothing lit is in view: try --camera"
+                    );
+                }
+                let tone = self.viewer.of_picture(seen);
+                self.write_picture("", seen, &tone);
+                picture = Some(Picture { camera, exposure: tone.exposure() });
             }
-            let tone = self.viewer.of_picture(&seen);
-            self.write_picture("", &seen, &tone);
-            picture = Some(Picture { camera, exposure: tone.exposure() });
-            image = Some(seen);
         }
         // Where the picture is black, what it does not show has its own exposure.
         let tone = self.viewer.of_meshes(image.as_ref(), &baked.light);
@@ -303,10 +306,11 @@ impl Files {
         if let (Some(Picture { camera, .. }), Ok(colours)) = (picture, light.colours()) {
             let mut coloured = baked.light.clone();
             coloured.surface = colours;
-            let image = self.interpolated(&camera, &coloured)?;
-            let shown = tone.unwrap_or_else(|| ToneCurve::fit_image(&image));
-            self.write_picture("bands.", &image, &shown);
-            tone = Some(shown);
+            if let Some(image) = self.interpolated(&camera, &coloured)? {
+                let shown = tone.unwrap_or_else(|| ToneCurve::fit_image(&image));
+                self.write_picture("bands.", &image, &shown);
+                tone = Some(shown);
+            }
         }
         if self.writes(Format::Ply) {
             let tone = tone.map(ToneCurve::of_radiosity);
@@ -327,13 +331,14 @@ impl Files {
         }
     }
 
-    /// The picture, interpolated between vertices or gathered by its pixels.
+    /// The picture, interpolated between vertices or gathered by its pixels; none after Ctrl-C, if
+    /// it takes long.
     fn picture(
         &self,
         camera: &Camera,
         baked: &BakeResult,
         device: &Backend,
-    ) -> Result<RadianceImage, Error> {
+    ) -> Result<Option<RadianceImage>, Error> {
         let [width, height] = self.image;
         if !self.pixel_gather {
             return self.interpolated(camera, &baked.light);
@@ -342,20 +347,34 @@ impl Files {
         let rays = baked.settings.gather.as_ref().map_or(2048, |gather| gather.rays);
         let mut gather =
             progress::of_stage("preparing rays", || device.gather(&baked.light.mesh, rays))?;
-        let image = progress::of_count("pixels gathered for the picture", |report| {
+        let image = progress::of_result("pixels gathered for the picture", |report| {
             camera.gathered_image(&baked.light, &mut *gather, width, height, SAMPLES, report)
         })?;
-        Ok(image.expect("its progress never stops it"))
+        Ok(or_warn(image))
     }
 
-    /// The picture by the light between vertices.
-    fn interpolated(&self, camera: &Camera, light: &GatheredMesh) -> Result<RadianceImage, Error> {
+    /// The picture by the light between vertices; none after Ctrl-C, if it takes long.
+    fn interpolated(
+        &self,
+        camera: &Camera,
+        light: &GatheredMesh,
+    ) -> Result<Option<RadianceImage>, Error> {
         let [width, height] = self.image;
-        let image = progress::of_count("pixels of the picture", |report| {
+        let image = progress::of_result("pixels of the picture", |report| {
             camera.interpolated_image(light, width, height, SAMPLES, report)
         })?;
-        Ok(image.expect("its progress never stops it"))
+        Ok(or_warn(image))
     }
+}
+
+/// Warns where an `image` was stopped.
+fn or_warn(image: Option<RadianceImage>) -> Option<RadianceImage> {
+    if image.is_none() {
+        eprintln!(
+            "warning: no picture: it would take longer than a second after the bake was stopped"
+        );
+    }
+    image
 }
 
 /// How a PLY file begins to tell its error, in per cent.

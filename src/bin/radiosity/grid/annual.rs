@@ -50,7 +50,7 @@ pub fn run(options: &Options, file: &Path, scene: Scene, grids: &[Placed]) -> Re
     let mut measured = vec![];
     for (place, grid) in grids {
         let points: Vec<GatherPoint> = grid.gather_points(&scene)?;
-        let found = progress::of_stoppable("points", |report| {
+        let found = progress::of_count("points", |report| {
             annual_daylight(&scene, &year, &points, &settings, report)
         })?;
         let mut found = found.ok_or(Stop::Interrupted)?.into_iter();

@@ -263,7 +263,7 @@ impl Options {
         }
         let [width, height] = IMAGE;
         let camera = self.camera.of(&baked.light, IMAGE);
-        let image = progress::of_count("pixels of the picture", |report| {
+        let image = progress::of_result("pixels of the picture", |report| {
             camera.interpolated_image(&baked.light, width, height, SAMPLES, report)
         })?;
         Ok(self.viewer.of_meshes(image.as_ref(), &baked.light))
