@@ -76,6 +76,9 @@ impl LightMap {
         let covered: Vec<u32> = (0..triangles.len() as u32)
             .filter(|&texel| triangles[texel as usize] != NO_TRIANGLE)
             .collect();
+        if agree(progress(0, covered.len())).is_break() {
+            return Ok(None);
+        }
         let mut map = LightMap::empty(atlas.clone(), triangles);
         let (field, points) = (light.radiosity_field(), TexelPoints::new(&atlas));
         let (mut remaining, mut batches) = (&covered[..], Batches::new(256));
@@ -102,7 +105,8 @@ impl LightMap {
         let count = triangles.len();
         LightMap {
             atlas,
-            irradiance: vec![Rgb::ZERO; count],
+            // The system gives it zeroed, and page by page as texels are gathered: 1.6 GB at 8192².
+            irradiance: bytemuck::allocation::zeroed_vec(count),
             gathered: vec![false; count],
             standard_error: vec![0.0; count],
             near_paths: vec![false; count],
