@@ -25,7 +25,7 @@ mod viewer;
 mod weather;
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 /// Runs `radiosity COMMAND ARGS…`.
 fn run(command: &str, args: &[&str]) -> Output {
@@ -546,38 +546,56 @@ fn an_interrupt_writes_what_there_is() {
 
 #[cfg(unix)]
 fn interrupt_by(signal: &str) {
-    use std::io::{BufRead, BufReader};
-
     let folder = tempfile::tempdir().unwrap();
     let stem = folder.path().join("box");
     let mut args = vec!["bake", cornell(), "--out", stem.to_str().unwrap(), "--cpu"];
     // Hours of work.
     args.extend(["--error", "0.00001", "--write", "ply,json"]);
-    let program = |args: &[&str]| {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
-        program.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
-        program.spawn().expect("the program starts")
-    };
-    let interrupt = |child: &Child| {
-        let id = child.id().to_string();
-        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
-    };
-    let mut child = program(&args);
     // The first line of progress says that the bake has begun.
-    let mut log = BufReader::new(child.stderr.take().unwrap());
-    let mut said = String::new();
-    while !said.contains("shooting") && !said.contains("gathering") {
-        assert!(log.read_line(&mut said).unwrap() > 0, "{said}");
-    }
-    interrupt(&child);
-    log.read_line(&mut said).unwrap();
-    let out = child.wait_with_output().unwrap();
-    let report = String::from_utf8(out.stdout).unwrap();
-    assert_eq!(out.status.code(), Some(130), "{said}{report}");
+    let [report, _] = interrupted(&args, signal, &["shooting", "gathering"]);
     assert!(report.contains("missed: it was stopped"), "{report}");
     assert!(!radiosity::io::read_ply(stem.with_extension("ply")).unwrap().faces.is_empty());
     let json = std::fs::read_to_string(stem.with_extension("json")).unwrap();
     assert!(json.contains("\"stopped\": true"), "{json}");
+}
+
+/// What the program prints that gets a `signal` once it has said one of `words`, to standard output
+/// and to standard error. It ends as a program that was stopped.
+#[cfg(unix)]
+fn interrupted(args: &[&str], signal: &str, words: &[&str]) -> [String; 2] {
+    use std::io::{BufRead, BufReader, Read};
+
+    let mut program = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+    program.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = program.spawn().expect("the program starts");
+    let mut log = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    while !words.iter().any(|word| said.contains(word)) {
+        assert!(log.read_line(&mut said).unwrap() > 0, "{said}");
+    }
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+    log.read_to_string(&mut said).unwrap();
+    let out = child.wait_with_output().unwrap();
+    let report = String::from_utf8(out.stdout).unwrap();
+    assert_eq!(out.status.code(), Some(130), "{said}{report}");
+    [report, said]
+}
+
+/// A picture that would take long is left out; all else is written.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_out_a_large_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let stem = folder.path().join("box");
+    let mut args = vec!["bake", cornell(), "--out", stem.to_str().unwrap(), "--cpu"];
+    // A minute of work.
+    args.extend(["--error", "0.3", "--write", "ply,png,json", "--image", "8192,8192"]);
+    let [report, said] = interrupted(&args, "-TERM", &["of the picture"]);
+    assert!(said.contains("warning: no picture"), "{said}");
+    assert!(report.contains("box.ply, ") && !report.contains("--camera"), "{report}");
+    assert!(!radiosity::io::read_ply(stem.with_extension("ply")).unwrap().faces.is_empty());
+    assert!(!stem.with_extension("png").exists() && stem.with_extension("json").exists());
 }
 
 #[test]
