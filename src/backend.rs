@@ -35,6 +35,7 @@ use crate::gather::{Gather, GatheredMesh};
 use crate::mesh::Mesh;
 use crate::scene::Scene;
 use cost::RowCost;
+use cpu::gather::{MOST_RAYS, MOST_RAYS_OF_MANY};
 use cpu::{RayGather, RayRows};
 #[cfg(feature = "gpu")]
 use gpu::{Gpu, HemicubeRows, TracedGather, TracedRows};
@@ -57,6 +58,8 @@ pub(crate) struct GatherRays {
     /// See [`RayGather::with_noise`].
     pub noise: f64,
     pub dim: f64,
+    /// See [`RayGather::with_most_rays`].
+    pub most: u32,
     /// Whether the light that is gathered is a solution of its scene, known on elements that may be
     /// too large for it near a point: see [`RayGather::with_near_field`].
     pub near_field: bool,
@@ -65,7 +68,12 @@ pub(crate) struct GatherRays {
 impl GatherRays {
     /// The same number of rays for each point, of any light.
     pub fn evenly(rays: u32) -> GatherRays {
-        GatherRays { rays, noise: f64::INFINITY, dim: 0.0, near_field: false }
+        GatherRays { rays, noise: f64::INFINITY, dim: 0.0, most: 1, near_field: false }
+    }
+
+    /// For points whose errors count in a mean square over many: of a solution.
+    pub fn of_many(rays: u32, noise: f64, dim: f64) -> GatherRays {
+        GatherRays { rays, noise, dim, most: MOST_RAYS_OF_MANY, near_field: true }
     }
 }
 
@@ -216,7 +224,7 @@ impl Backend {
         }
         let (rays, noise) = rays_for_noise(noise);
         let dim = light.radiosity_field().radiosity_floor(Measure::default().floor);
-        let rays = GatherRays { rays, noise, dim, near_field: false };
+        let rays = GatherRays { rays, noise, dim, most: MOST_RAYS, near_field: false };
         self.gather_with_fallback(&light.mesh, rays, |_| ())
     }
 
@@ -249,16 +257,18 @@ impl Backend {
     pub(crate) fn gather_with(
         &self,
         mesh: &Mesh,
-        GatherRays { rays, noise, dim, near_field }: GatherRays,
+        GatherRays { rays, noise, dim, most, near_field }: GatherRays,
     ) -> Result<Box<dyn Gather>, Error> {
         match self {
             #[cfg(feature = "gpu")]
             Backend::Gpu(gpu) if self.gathers_on_device() => {
                 let gather = TracedGather::with_noise(gpu, mesh, rays, noise, dim)?;
+                let gather = gather.with_most_rays(most);
                 Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
             _ => {
                 let gather = RayGather::new(mesh, rays)?.with_noise(noise, dim);
+                let gather = gather.with_most_rays(most);
                 Ok(Box::new(if near_field { gather.with_near_field() } else { gather }))
             }
         }

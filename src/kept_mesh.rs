@@ -71,12 +71,8 @@ impl BakeResult {
         // Those of a bake to this error.
         let gather = settings.gather.as_ref();
         let (rays, noise) = gather.map_or((1024, error), |g| (g.rays, g.noise_tolerance));
-        let rays = GatherRays {
-            rays,
-            noise,
-            dim: self.light.radiosity_field().radiosity_floor(floor),
-            near_field: true,
-        };
+        let dim = self.light.radiosity_field().radiosity_floor(floor);
+        let rays = GatherRays::of_many(rays, noise, dim);
         let mut gatherer = backend.gather_with_fallback(&self.light.mesh, rays, |_| ())?;
         let kept = KeptVertices::gather(mesh, &self.light, &mut *gatherer, &mut progress)?;
         let Some(mut kept) = kept else { return Ok(None) };

@@ -88,7 +88,7 @@ impl<'a> ResilientBackend<'a> {
         noise: f64,
         dim: f64,
     ) -> Result<Box<dyn Gather + '_>, Error> {
-        self.gather_by(mesh, GatherRays { rays, noise, dim, near_field: true })
+        self.gather_by(mesh, GatherRays::of_many(rays, noise, dim))
     }
 
     /// A gatherer of any light, with as many rays for each point.

@@ -75,7 +75,7 @@ pub struct GatherSettings {
     pub contact_levels: u32,
     /// Rays a vertex, or as many pixels of a hemicube as are worth that.
     pub rays: u32,
-    /// Rays cast on the CPU are doubled, up to 16 times as many, while the estimated error of the
+    /// Rays cast on the CPU are doubled, up to 4 times as many, while the estimated error of the
     /// irradiance is above this share of it; infinity for never.
     pub noise_tolerance: f64,
     /// Where elements are split, and how often all vertices gather.

@@ -187,7 +187,7 @@ pub(super) fn gatherer_past<'a>(
         // For an error of about 2 %.
         None => (1024, f64::INFINITY),
     };
-    let rays = GatherRays { rays, noise, dim, near_field };
+    let rays = GatherRays { near_field, ..GatherRays::of_many(rays, noise, dim) };
     backend.gather_with_fallback(&baked.light.mesh, rays, |_| ())
 }
 

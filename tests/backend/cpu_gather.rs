@@ -37,6 +37,10 @@ fn noisy_points_get_more_rays() {
     // Some 8 of 256 rays find it: 1/8 off, or less as they are stratified. Four times as many are
     // off by less than half of that; 16 times by a quarter of that again.
     assert!(plain > 0.04 && more < plain / 2.0 && all < plain / 4.0);
+    // A limit of no more rays leaves the first ones, one of twice as many is in between.
+    let up_to = |times: u32| off(few().with_noise(0.02, 0.0).with_most_rays(times));
+    assert_eq!([up_to(1), up_to(16)], [plain, more]);
+    assert!(more < up_to(2) && up_to(2) < plain);
     // Where they agree, nothing changes: with light from everywhere, bit for bit.
     let even =
         GivenRadiosity::new(Mesh::new(cube(&Material::grey("even", 0.5)), 0.5).unwrap(), |_, _| {

@@ -27,7 +27,7 @@ use super::traced_scene::TracedScene;
 use super::tracing::GatherPass;
 use crate::backend::adapter::AdapterKind;
 use crate::backend::cpu::RayGather;
-use crate::backend::cpu::gather::{RAYS_PER_SHADOW_RAY, max_rays, min_rays, samples};
+use crate::backend::cpu::gather::{MOST_RAYS, RAYS_PER_SHADOW_RAY, max_rays, min_rays, samples};
 use crate::error::{Error, ErrorKind};
 use crate::gather::lights::Lights;
 use crate::gather::{Gather, GatherPoint, IrradianceSample, RadiosityField};
@@ -111,7 +111,7 @@ impl TracedGather {
         dim: f64,
     ) -> Result<TracedGather, Error> {
         let min_rays = min_rays(count)?;
-        let max_rays = max_rays(min_rays, noise);
+        let max_rays = max_rays(min_rays, noise, MOST_RAYS);
         check_textures(gpu.limits().texture)?;
         let scene = mesh.scene();
         let lights = Arc::new(Lights::new(mesh.shared_scene()));
@@ -140,6 +140,12 @@ impl TracedGather {
             rays: 0,
             seconds: 0.0,
         })
+    }
+
+    /// Doubles the number of rays up to `times` as many, a power of two up to 16.
+    pub fn with_most_rays(self, times: u32) -> TracedGather {
+        let on_cpu = self.on_cpu.map(|gather| gather.with_most_rays(times));
+        TracedGather { max_rays: self.max_rays.min(times * self.min_rays), on_cpu, ..self }
     }
 
     /// Finds the light of near surfaces by paths: see [`RayGather::with_near_field`].
