@@ -283,7 +283,7 @@ impl Files {
                 Some(estimate) => error_comment(estimate, "preview"),
                 None => "preview, its error is not known yet".into(),
             }];
-            write_ply_with_tone(&self.output.path("ply"), &surface, &tone)?;
+            write_ply_with_tone(self.output.path("ply"), &surface, &tone)?;
         }
         if self.writes(Format::Glb) {
             let error = estimate.map_or(0.0, |estimate| estimate.total);
