@@ -41,6 +41,7 @@ fn noisy_points_get_more_rays() {
     let up_to = |times: u32| off(few().with_noise(0.02, 0.0).with_most_rays(times));
     assert_eq!([up_to(1), up_to(16)], [plain, more]);
     assert!(more < up_to(2) && up_to(2) < plain);
+    assert_eq!([up_to(0), up_to(3)], [up_to(1), up_to(2)]);
     // Where they agree, nothing changes: with light from everywhere, bit for bit.
     let even =
         GivenRadiosity::new(Mesh::new(cube(&Material::grey("even", 0.5)), 0.5).unwrap(), |_, _| {

@@ -110,7 +110,8 @@ impl RayGather {
         RayGather { samples: [const { OnceLock::new() }; LEVELS], noise, dim, ..self }
     }
 
-    /// Doubles the number of rays up to `times` as many, a power of two, in place of 16.
+    /// Doubles the number of rays up to `times` as many in place of 16; what is no power of two is
+    /// rounded down, and 0 is 1.
     pub fn with_most_rays(self, times: u32) -> RayGather {
         RayGather { samples: [const { OnceLock::new() }; LEVELS], most: times, ..self }
     }
@@ -318,7 +319,8 @@ pub(crate) const MOST_RAYS_OF_MANY: u32 = 4;
 /// `noise`.
 pub(crate) fn max_rays(min_rays: u32, noise: f64, times: u32) -> u32 {
     match noise.is_finite() {
-        true => times.saturating_mul(min_rays).min(hemisphere::MAX_RAYS),
+        // Rays are doubled: they come in powers of two.
+        true => min_rays.saturating_mul(1 << times.max(1).ilog2()).min(hemisphere::MAX_RAYS),
         false => min_rays,
     }
 }

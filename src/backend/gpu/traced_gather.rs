@@ -142,10 +142,14 @@ impl TracedGather {
         })
     }
 
-    /// Doubles the number of rays up to `times` as many, a power of two up to 16.
+    /// Doubles the number of rays up to `times` as many, at most 16: see
+    /// [`RayGather::with_most_rays`].
+    ///
+    /// [`RayGather::with_most_rays`]: crate::backend::cpu::RayGather::with_most_rays
     pub fn with_most_rays(self, times: u32) -> TracedGather {
         let on_cpu = self.on_cpu.map(|gather| gather.with_most_rays(times));
-        TracedGather { max_rays: self.max_rays.min(times * self.min_rays), on_cpu, ..self }
+        let max_rays = max_rays(self.min_rays, self.noise, times).min(self.max_rays);
+        TracedGather { max_rays, on_cpu, ..self }
     }
 
     /// Finds the light of near surfaces by paths: see [`RayGather::with_near_field`].

@@ -1,5 +1,6 @@
 //! The files that a bake writes: STEM with the ending of each.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -265,8 +266,8 @@ impl Files {
         if writes_mesh && !self.output.is_dash() {
             return Ok(());
         }
-        let (found, remedy) = ("without a file to write", "add ply or glb to --write");
-        Err(Error::new(ErrorKind::Setting, "--preview", found, remedy))
+        let remedy = "add ply or glb to --write, and name files with --out";
+        Err(Error::new(ErrorKind::Setting, "--preview", "without a file to write", remedy))
     }
 
     /// Writes meshes of the `light` of a bake that is under way, with its estimated error, if that
@@ -392,13 +393,12 @@ fn comments(baked: &BakeResult) -> Vec<String> {
     if baked.settings.solve.ambient {
         comments.push("ambient term of the unshot light added to the elements".into());
     }
-    let outcome = format!("{}; vertices have their own", baked.outcome);
-    comments.push(error_comment(&baked.estimate, &outcome));
+    comments.push(error_comment(&baked.estimate, baked.outcome) + "; vertices have their own");
     comments
 }
 
 /// The `comment` that tells an error, with a remark.
-fn error_comment(estimate: &ErrorEstimate, remark: &str) -> String {
+fn error_comment(estimate: &ErrorEstimate, remark: impl Display) -> String {
     format!(
         "{ESTIMATED_ERROR}{:.3} % of reflected radiosity, RMS over area, at {} places ({remark})",
         100.0 * estimate.total,
